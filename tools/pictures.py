@@ -19,6 +19,7 @@ from PIL import Image
 
 from benchmarks.browser import browser_path
 from benchmarks.browser import viewer as view
+from benchmarks.labels import volumes
 from benchmarks.results import RESULTS, ROOT, add
 from texgs.core.camera import orbit
 from texgs.core.figures import Cell, Row, as_picture, content, grid_rows, lay_out
@@ -27,7 +28,12 @@ from texgs.scene.cut_view import scene_and_volume
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
 from texgs.scene.twin import Twin, twin_of
+from texgs.volume.caster import Caster
+from texgs.volume.framing import frame_of
+from texgs.volume.label_names import color_of
 from texgs.volume.nrrd_file import open_grid
+from texgs.volume.overlay import overlays
+from texgs.volume.render import Appearance
 from texgs.volume.slice_picture import SliceKeys, slice_picture
 from tools import workflow_picture
 
@@ -133,6 +139,20 @@ def slices(run: Path) -> Image.Image:
     return Image.fromarray(slice_picture(grid, SliceKeys(at=(24, -20, 8), width=1200), {}))
 
 
+def labels(_: Path) -> Image.Image:
+    """Draw labels of the frog, whose numbers are interpolated, then each by its mask."""
+    _, frog = volumes(["frog.mhd"])
+    camera = orbit(150, 20, *frame_of(frog.masks, frog.of_masks).lens().square(560))
+    colors, pictures = [*map(color_of, frog.numbers)], dict[str, np.ndarray]()
+    ways = {"numbers, interpolated": (frog.grid, frog.of_numbers), "masks": (frog.masks, frog.of_masks)}
+    for title, (grid, white) in ways.items():
+        tfs = {str(k): replace(tf, color=((0.0, *colors[k]),)) for k, tf in enumerate(white)}
+        rgba = Caster(grid, Appearance()).cast(overlays(tfs), camera, Light("headlight")).rgba
+        pictures[title] = (rgba[..., :3] + 1 - rgba[..., 3:]).clamp(0, 1).numpy()
+    box = content([*pictures.values()])
+    return as_picture(lay_out([Row("", [Cell(title, each[box]) for title, each in pictures.items()])]))
+
+
 def copy(pattern: str, smaller: int = 1) -> Callable[[Path], Image.Image]:
     """Take a picture that the run itself makes, so many times smaller."""
     return lambda run: Image.open(next(run.glob(pattern))).convert("RGB").reduce(smaller)
@@ -187,6 +207,7 @@ PICTURES = {
     ),
     "styles": Picture(styles, "styles", f"{FIT} image"),
     "slices": Picture(slices, "mni152", "volume texgs.volume.slice_picture"),
+    "labels": Picture(labels, "2026-11-30-labels.csv"),
     "viewer": Picture(viewer, "engine", f"{FIT} compose texgs.viewer.server"),
 }
 

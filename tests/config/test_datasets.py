@@ -16,6 +16,7 @@ from tests.shipped import DATASETS, ROOT, tracked
 from texgs.config.compose import compose
 from texgs.core.errors import ConfigError
 from texgs.volume.basic_tfs import in_data_values
+from texgs.volume.label_masks import label_counts
 from texgs.volume.sources import open_source
 from texgs.workflow.checks import check_basic_tfs
 from texgs.workflow.locate import source_file, tf_names, views_folder
@@ -120,9 +121,19 @@ def test_agrees_with_the_real_volume(name, manifest):
     assert config.volume.sha256 in (None, known["sha256"])
     if name in PAPER:
         assert source.dims == dims_of(name)
+    low, high = (0, 255) if config.volume.kind == "labels" else (known["min"], known["max"])
     for tf, points in config.basic_tfs.items():
-        first, last = in_data_values(tf, points, "data", known["min"], known["max"]).support
-        assert known["min"] <= first < last <= known["max"]
+        first, last = in_data_values(tf, points, "data", low, high).support
+        assert low <= first < last <= high
+
+
+def test_labels_of_the_frog_are_those_of_the_file():
+    """All of them but stray samples."""
+    volume, labels = dataset("frog").volume, dataset("frog").labels
+    counts = label_counts(open_source(real_data(f"volumes/{volume.file}")))
+    numbers = [volume.label_numbers[label] for label in labels]
+    assert numbers == list(range(1, 16))
+    assert sum(counts[number] for number in numbers) > 0.999 * sum(counts.values())
 
 
 def test_the_published_views_are_found():

@@ -18,6 +18,7 @@ from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.palette.test_palette import box
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_release_texture import release_run
+from tests.fuzz.labels import LABELS
 from tests.fuzz.volumes import VOLUMES, Reader, at
 from tests.study.test_ballots import STUDY, ballot
 from tests.volume.test_tf_files import RAMP, TENT, preset
@@ -153,6 +154,7 @@ def checkpoint(folder: Path) -> Path:
 COMPACT = at("model.texgs", write_compact, sample())
 READERS: dict[str, Reader] = {
     **VOLUMES,
+    **LABELS,
     "tf ours": Reader(at("tf.json", write_json, TF_OURS), read_function),
     "tf ParaView": Reader(lambda folder: preset(folder, ColorSpace="Diverging", Points=RAMP), read_function),
     "views json": Reader(views, read_view_set, "transforms_train.json"),

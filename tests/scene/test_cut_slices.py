@@ -9,6 +9,7 @@ from PIL import Image
 from scipy.ndimage import map_coordinates
 
 from tests.fields.surfels.test_composition import ball
+from tests.refusals import refused
 from tests.scene.labelled import BLUE, RED, labelled_scene
 from texgs.cli.main import main
 from texgs.core.camera import orbit
@@ -25,7 +26,7 @@ from texgs.volume.slices import window_of
 
 CAMERA = orbit(-35, 25, 2.2, 30, 90, 70)
 PLANES = [Plane([1.0, 0.3, 0.1], 0.05), Plane([0.0, 0.2, 1.0], 0.1)]
-SLICES = Cuts(PLANES, faces="slice", window=[0.0, 200.0])
+SLICES = Cuts(PLANES, faces="slice", window=(0.0, 200.0))
 
 
 @pytest.fixture(scope="module")
@@ -108,7 +109,7 @@ def test_a_click_on_a_face_is_on_its_plane_even_if_all_models_are_hidden(scene, 
 def test_the_window_is_that_of_the_volume_unless_it_is_told(scene):
     twin, composed = Twin(scene), scene.open()
     grid = open_grid(scene.volume.file)
-    told = replace(scene, cuts=replace(SLICES, window=[*window_of(grid)]))
+    told = replace(scene, cuts=replace(SLICES, window=window_of(grid)))
     left = replace(scene, cuts=replace(SLICES, window=None))
     one, other = (cut_view(composed, CAMERA, each, twin).color for each in (told, left))
     assert torch.equal(one, other)
@@ -119,8 +120,10 @@ def test_words_make_slices_and_take_them_back(scene, tmp_path):
     session = Session(replace(scene, cuts=Cuts()))
     apply_all(session, ["cut=x,0", "cut.faces=slice", "cut.window=-50,150"])
     cuts = session.scene.cuts
-    assert (cuts.faces, cuts.window) == ("slice", [-50.0, 150.0])
+    assert (cuts.faces, cuts.window) == ("slice", (-50.0, 150.0))
     assert read_scene(write_scene(tmp_path / "a.yaml", session.scene)).cuts == cuts
+    for words, told in (("1,2,3", "expected 2 values, got 3"), ("1,b", "expected a number, got 'b'")):
+        refused(lambda words=words: apply_all(session, [f"cut.window={words}"]), f"cuts.window.*{told}")
     apply_all(session, ["cut.window=", "cut.faces="])
     assert session.scene.cuts == Cuts([Plane([1.0, 0.0, 0.0], 0.0)])
 

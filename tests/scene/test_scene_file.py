@@ -165,6 +165,8 @@ def test_a_variant_replaces_texels(folder):
         ({"cuts": {"planes": [{"normal": [0, 0, 0]}]}}, "cuts: normal: expected three numbers that are not"),
         ({"cuts": {"box": {"low": [1e9, 0, 0], "high": [1, 1, 1]}}}, "cuts.box.low: expected at most 1e"),
         ({"cuts": {"faces": "dark"}}, "cuts.faces: expected one of shaded, unlit, slice, got dark"),
+        ({"cuts": {"window": [1]}}, "cuts.window: expected 2 values, got 1"),
+        ({"cuts": {"window": [1, "x"]}}, "cuts.window.1: expected a number, got 'x'"),
         ({"frame": 3}, "frame: expected keys with values, got 3"),
         ({"frame": {"radius": 1}}, "frame.target: expected a value, got none"),
         ({"frame": {"target": [0, 0, "x"], "radius": 1}}, "frame.target.2: expected a number, got 'x'"),

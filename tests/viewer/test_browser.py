@@ -8,6 +8,7 @@ import torch
 from PIL import Image
 
 from tests.edit.lift_scenes import two_balls
+from tests.scene.balls import balls_in_a_volume
 from tests.viewer.in_browser import (
     JPEG,
     LINK,
@@ -25,10 +26,27 @@ from tests.viewer.in_browser import (
 )
 from tests.viewer.training_views import write_results
 from texgs.core.camera import orbit
+from texgs.core.cuts import Cuts, Plane
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment
 
 BLUE = (0.3, 0.1, 0.1)  # where the blue ball is seen
+
+
+def test_faces_of_cuts_show_slices_where_there_is_a_volume(chromium, scene_file, tmp_path):
+    cuts = Cuts([Plane([1.0, 0.0, 0.0], 0.05)], faces="slice", window=(-1.0, 1.0))
+    volume = write_scene(tmp_path / "sliced.yaml", balls_in_a_volume(tmp_path, cuts=cuts))
+    with served(volume) as (_, address), opened(chromium, address) as page:
+        faces = page.get_by_label("Faces")
+        expect(faces).to_have_value("slice")
+        assert still(page) == rendered(volume, page)
+        faces.select_option("Shaded")
+        faces.select_option("Slice")
+        expect(page.get_by_role("listitem").last).to_have_text("cuts 1 plane, slice")
+        save_as(page, "again.yaml")
+        assert read_scene(tmp_path / "again.yaml").cuts == cuts
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        expect(page.get_by_label("Faces").locator("option")).to_have_text(["Shaded", "Without light"])
 
 
 def test_what_is_edited_shows_and_is_saved(chromium, scene_file):

@@ -217,6 +217,12 @@ async def test_pages_cut_the_scene(browser, client):
     await browser.send(**edit, value={"planes": [up, up], "faces": "unlit"}, title="two planes")
     cuts = (await browser.past("two planes"))["scene"]["cuts"]
     assert cuts == {"planes": 2 * [{"normal": [0, 1, 0], "offset": 0.25}], "box": None, "faces": "unlit"}
+    sliced = {"planes": [up], "faces": "slice", "window": [-1, 0.5]}
+    await browser.send(**edit, value=sliced, title="slices")
+    cuts = (await browser.past("slices"))["scene"]["cuts"]
+    assert (cuts["faces"], cuts["window"]) == ("slice", [-1, 0.5])
+    await browser.send(type="undo")
+    await browser.past()
     assert isolated(client.server_side.edits.scene, "TF01").cuts == NO_CUTS, "clicks select what is whole"
     await browser.send(type="undo")
     assert (await browser.past())["scene"]["cuts"] == {"planes": [], "box": None, "faces": "shaded"}

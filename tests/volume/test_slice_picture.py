@@ -74,6 +74,8 @@ def test_labels_without_an_image_are_on_black(tmp_path):
     session.set("red", "visible", False)
     hidden = session.slices(SliceKeys("axial", 10, width=450))
     assert tuple(hidden[100, 155]) == (0, 0, 0)
+    grid, known = open_grid(session.scene.volume.file), {"bone": (0, None), "vessel": (1, None)}
+    assert words_at(grid, point_of(grid, (5, 13, 10)), known) == "L -2.5, P -7, S 52 mm; bone"
 
 
 def test_all_three_are_side_by_side_in_one_scale(scene):

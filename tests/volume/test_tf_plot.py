@@ -126,3 +126,26 @@ def test_a_robust_histogram_takes_the_place_of_the_whole_one():
         np.testing.assert_allclose(edges, spaced)
         assert opacity.get_xscale() == robust["scale"]
         assert opacity.get_xlim()[1] < 1.1
+
+
+def test_labels_share_a_panel_with_the_size_of_each():
+    """In the unit of the file, cubed, where it has one."""
+    lattice = {"space": {"unit": "mm"}, "spacing": (1, 2, 3)}
+    sizes = {"label a": [40, 10, 20, 30], "label 7": [99, 0, 0, 1]}
+    channels = {key: {**known(counts, 0, 255, "uint8"), **lattice} for key, counts in sizes.items()}
+    step = TransferFunction(((127.5, 0.9), (255, 0.9)), ((127.5, 1, 0, 0),))
+    tfs = {"a": step, "seven": replace(step, channel=1, color=((127.5, 0, 0, 1),))}
+    (axes,) = plot(channels, tfs, "frog").axes
+    assert [bar.get_width() for bar in axes.patches] == [6 * 1, 6 * 50], "the first is at the top"
+    assert [bar.get_facecolor()[:3] for bar in axes.patches] == [(0, 0, 1), (1, 0, 0)]
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["seven", "a"]
+    assert (axes.get_xlabel(), axes.get_title()) == ("mm\N{SUPERSCRIPT THREE}", "frog")
+    casts = dict.fromkeys("abcdefgh", np.zeros((CAST_PIXELS, CAST_PIXELS, 3)))
+    rows = plot(channels, tfs, casts=casts).axes[1:]
+    assert [len(row.get_xticks()) for row in rows] == [6, 2]
+    image = {"": known([1, 2, 3, 4], 0, 9), **channels}
+    below = {name: replace(tf, channel=tf.channel + 1) for name, tf in tfs.items()} | {"TF01": BLUE}
+    opacity, axes, _ = plot(image, below, "scan").axes
+    assert [opacity.get_title(), axes.get_title(), len(axes.patches)] == ["scan", "", 2]
+    channels["label a"]["space"]["unit"] = ""
+    assert plot(channels, tfs).axes[0].get_xlabel() == "samples"

@@ -77,7 +77,7 @@ def test_views_of_a_function_are_those_of_a_data_set_of_its_channel(both, image,
             assert torch.equal(one.camera.viewmat, other.camera.viewmat)
             assert torch.equal(one.load(), other.load())
             assert one.load().any()
-    assert seen.metadata["tf"].get("channel", 0) == both.dataset.number_of(both.dataset.basic_tfs["core"])
+    assert seen.metadata["tf"].get("channel", 0) == both.dataset.prepared.index("1")
 
 
 def test_the_volume_is_prepared_once_for_all_functions_and_again_for_other_channels(both):

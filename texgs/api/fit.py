@@ -133,7 +133,7 @@ def configuration(
     from texgs.config.compose import recompose
     from texgs.config.dataset import dataset_of
     from texgs.config.project import check_name
-    from texgs.volume.basic_tfs import BasicTF
+    from texgs.volume.basic_tfs import basic_tf_of
     from texgs.volume.transfer import check_disjoint
 
     check_disjoint(functions)
@@ -146,8 +146,12 @@ def configuration(
         check_name("name", name)
     few = (f"views.test.count={TEST_VIEWS}", f"views.relit={TEST_VIEWS}", "views.turntable=1")
     config = recompose(("tracking=none", "edit=none", *few, "metric.vtk_frames=0", *words))
-    basic = {name: BasicTF(**tf.to_dict()) for name, tf in functions.items()}
-    dataset = dataset_of(volume.name, copied(volume, folder).resolve(), basic)
+    basic = {name: basic_tf_of(tf, [*volume.channels]) for name, tf in functions.items()}
+    file = copied(volume, folder).resolve()
+    has_image = "" in volume.channels
+    labels = str(file) if has_image and len(volume.channels) > 1 else None
+    kind = "image" if has_image else "labels"
+    dataset = dataset_of(volume.name, file, basic, kind=kind, labels=labels)
     return replace(config, dataset=dataset, results=str(folder))
 
 
@@ -161,5 +165,5 @@ def copied(volume: Volume, folder: Path) -> Path:
             f"folder: expected one without another {file.name} or {summary_file(file).name}, got {folder}; "
             "choose another folder, or another name= of the volume"
         )
-    write_summaries(file, [volume.summary], [""])
+    write_summaries(file, [*volume.channels.values()], [*volume.channels])
     return file

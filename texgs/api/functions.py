@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from io import BytesIO
 from typing import TYPE_CHECKING
 
@@ -22,18 +23,18 @@ class Functions(dict[str, TransferFunction]):
 
     Args:
         functions: by name.
-        summary: of the volume: its histogram is what is behind them.
+        channels: summaries of the volume's, by name: histograms are what is behind functions.
     """
 
-    def __init__(self, functions: Mapping[str, TransferFunction], summary: Summary) -> None:
+    def __init__(self, functions: Mapping[str, TransferFunction], channels: Mapping[str, Summary]) -> None:
         super().__init__(functions)
-        self._summary = summary
+        self._channels = channels
 
     def plot(self) -> Figure:
-        """Return a figure of matplotlib: opacities and colours over the number of voxels, on a log axis."""
+        """Return a figure of matplotlib: opacities and colours over the number of voxels; sizes of labels."""
         from texgs.volume.tf_plot import plot
 
-        return plot({"": vars(self._summary)}, self)
+        return plot({name: asdict(each) for name, each in self._channels.items()}, self)
 
     def _repr_png_(self) -> bytes:
         """Return the plot, for notebooks."""

@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from filecmp import cmp
+from functools import partial
 from html import escape
 from inspect import signature
 from operator import index
@@ -17,20 +18,23 @@ from texgs.api.arrays import keys_of_format, several, source_of
 from texgs.api.display import as_python, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
 from texgs.api.keywords import takes
-from texgs.config.project import check_name, name_of
-from texgs.core.errors import ArgumentError, ConfigError
-from texgs.core.names import close
+from texgs.api.labels import sources_of
+from texgs.config.project import is_name, name_of
+from texgs.core.errors import ArgumentError
+from texgs.core.names import close, mask_name
 from texgs.fields.part_edit import color
 from texgs.scene.frame import quantize
 from texgs.scene.scene import WHITE
 from texgs.scene.scene_file import light_of
 from texgs.scene.shot import Shot
+from texgs.volume.basic_tfs import function_of
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
+from texgs.volume.label_choice import label_tf
 from texgs.volume.matter import Matter
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlays
-from texgs.volume.prepare import prepare
+from texgs.volume.prepare import prepare_channels
 from texgs.volume.render import Appearance
 from texgs.volume.slabs import Source
 from texgs.volume.slice_picture import SliceKeys, sample_at, slice_picture
@@ -65,6 +69,10 @@ class Volume:
         reduce: one sample for every block of reduce^3.
         method: "mean" of a block, or "sample", its middle, for labels.
         nan_value: takes the place of samples that are not finite, which are refused without it.
+        kind: "image", or "labels": whole numbers that name what samples belong to, each a channel of its own.
+        labels: beside an image, a file or an array of labels on its lattice; of a volume of labels, the names
+            or numbers of those to show, default the 16 largest.
+        names: table with names and colours of labels, of ITK-SNAP, FreeSurfer or 3D Slicer.
         name: of the volume, in titles; default that of the file, or "data".
         folder: for the file, of this volume alone; default one that is gone with the object.
         **keys: what only some formats take, such as `dims` and `dtype` of raw samples, see
@@ -86,6 +94,9 @@ class Volume:
         reduce: int = 1,
         method: str = "mean",
         nan_value: float | None = None,
+        kind: str = "image",
+        labels: Any = None,
+        names: str | Path | None = None,
         name: str | None = None,
         folder: str | Path | None = None,
         **keys: Any,
@@ -95,24 +106,23 @@ class Volume:
         self.name = name = default_name(data) if name is None else name
         self._scratch = TemporaryDirectory(prefix="texgs-") if folder is None else None
         self.folder = Path(folder if folder is not None else self._scratch.name)  # type: ignore[union-attr]
-        if isinstance(data, str | Path):
-            steps, first = several("spacing", spacing, 3), several("origin", origin, 3)
-            source = open_source(data, spacing=steps, origin=first, **keys_of_format(keys))
-        elif keys:
-            hint = close(next(iter(keys)), signature(Volume).parameters)
-            raise ArgumentError(f"{', '.join(keys)}: not for arrays{hint or '; leave them out'}")
-        else:
-            source = source_of(data, name, spacing, origin)
-        self._channel = source.channel
+        crop, nan_value = several("crop", crop, 6, index), as_python(nan_value)
+        open_file = partial(opened, name=name, spacing=spacing, origin=origin, keys=keys)
+        shown, sources = sources_of(data, open_file, kind, labels, names, crop, reduce)
+        self._channel = sources[0].channel
         if up is None:
             up = "+z" if isinstance(data, str | Path) and tells_superior(Path(data)) else "+y"
-        crop, nan_value = several("crop", crop, 6, index), as_python(nan_value)
         how = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": nan_value}
-        self.summary = self._prepared(source, how)
-        if source.note:
-            warnings.warn(f"{name}: {source.note.replace('dataset.volume.', '')}", stacklevel=2)
+        self.summary, *others = self._prepared(sources, how)
+        if note := sources[0].note:
+            warnings.warn(f"{name}: {note.replace('dataset.volume.', '')}", stacklevel=2)
         self.grid = open_grid(self.file)  # samples [Z, Y, X] with spacing and origin, +y up
-        write_summaries(self.file, [self.summary], [""])
+        prepared = ["" if each.label is None else mask_name(each.label) for each in sources]
+        self.channels = dict(
+            zip(prepared, (self.summary, *others), strict=True)
+        )  # "" is the image, then masks
+        write_summaries(self.file, [*self.channels.values()], prepared)
+        self._labels = {name: function_of(label_tf(each), prepared) for name, each in shown.items()}
 
     @classmethod
     def from_pyvista(cls, image: pyvista.ImageData, **options: Any) -> Volume:
@@ -124,7 +134,7 @@ class Volume:
         """Return the file, volume.nrrd, which ParaView opens, too."""
         return self.folder / "volume.nrrd"
 
-    def _prepared(self, source: Source, how: dict[str, Any]) -> Summary:
+    def _prepared(self, sources: list[Source], how: dict[str, Any]) -> list[Summary]:
         """Write the file; one of another volume, or that the data are in, is left alone."""
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -134,18 +144,19 @@ class Volume:
             ) from error
         with TemporaryDirectory(prefix=".volume-", dir=self.folder) as scratch:
             made = Path(scratch, self.file.name)
-            summary = prepare(source, made, **how)
+            summaries = prepare_channels(sources, made, **how)
             if self.file.exists() and not cmp(made, self.file, shallow=False):
                 raise ArgumentError(
                     f"folder: expected one without another volume, got {self.file}; choose another folder, "
                     "or remove that file"
                 )
             made.replace(self.file)
-        return summary
+        return summaries
 
     def suggest(self, count: int | None = None) -> Functions:
-        """Return basic transfer functions by name: `count` of the histogram, what shows, or a channel's."""
-        return Functions(suggest(vars(self.summary), count, self._channel), self.summary)
+        """Return basic transfer functions by name: `count` of an image, what shows, and one of each label."""
+        image = suggest(vars(self.summary), count, self._channel) if "" in self.channels else {}
+        return Functions({**image, **self._labels}, self.channels)
 
     def render(
         self,
@@ -223,11 +234,26 @@ class Volume:
         return f"<b>{escape(self.name)}</b><div>{picture}<table>{cells}</table></div>"
 
 
+def opened(
+    data: Any,
+    layer: str | None,
+    name: str,
+    spacing: Sequence[float] | None,
+    origin: Sequence[float] | None,
+    keys: dict[str, Any],
+) -> Source:
+    """Return a file, a layer of it or an array as a source; arguments as for `Volume`."""
+    if isinstance(data, str | Path):
+        steps, first = several("spacing", spacing, 3), several("origin", origin, 3)
+        said = keys if layer is None else {**keys, "channel": layer}
+        return open_source(data, spacing=steps, origin=first, **keys_of_format(said))
+    if keys:
+        hint = close(next(iter(keys)), signature(Volume).parameters)
+        raise ArgumentError(f"{', '.join(keys)}: not for arrays{hint or '; leave them out'}")
+    return source_of(data, name, spacing, origin)
+
+
 def default_name(data: Any) -> str:
     """Return the name of a file or folder, as a data set can have it; "data" where it has none."""
     name = name_of(Path(data)) if isinstance(data, str | Path) else ""
-    try:
-        check_name("name", name)
-    except ConfigError:
-        return "data"
-    return name
+    return name if is_name(name) else "data"

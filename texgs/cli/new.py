@@ -8,9 +8,11 @@ from contextlib import suppress
 from dataclasses import asdict, replace
 from math import prod
 from pathlib import Path
+from shutil import rmtree
 from typing import TYPE_CHECKING
 
-from texgs.cli.new_tfs import with_tfs
+from texgs.cli.new_labels import KIND_KEYS, are_labels, as_labels, found_in, with_chosen, without_lists
+from texgs.cli.new_tfs import read_volume, with_tfs
 from texgs.cli.options import require_only_files
 from texgs.config.compose import compose
 from texgs.config.dataset_text import as_yaml, plain_tf, require_read
@@ -18,12 +20,13 @@ from texgs.config.project import FORBIDDEN_LETTERS, check_name, name_of
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import is_there, write_bytes
 from texgs.core.memory import room_for_volume
+from texgs.volume.grid import MAX_CHANNELS
+from texgs.volume.settings import VolumeKeys
 
 if TYPE_CHECKING:
     from texgs.config.dataset import Dataset
     from texgs.config.schema import Config
     from texgs.volume.axes import Channel
-    from texgs.volume.settings import VolumeKeys
     from texgs.volume.slabs import Source
 
 SAMPLE_BYTES = 4  # at most, in a prepared volume
@@ -59,19 +62,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="transfer functions to take instead: JSON, or ParaView presets",
     )
+    parser.add_argument(
+        "--names",
+        type=Path,
+        metavar="FILE",
+        help="names and colours of labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer",
+    )
     parser.add_argument("--force", action="store_true", help="replace a data set of that name")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Make a data set of the volume, with all its channels, and say what comes next."""
     from texgs.config.project import members, own_folder, short_path
-    from texgs.edit.series import moments_of
-    from texgs.volume.sources import tells_superior
+    from texgs.volume.sources import tells_labels, tells_superior
     from texgs.workflow.locate import series_files
 
     check_options(arguments)
     name = arguments.name or name_of(arguments.file)
     overrides = [word.removeprefix("dataset.volume.") for word in arguments.overrides]
+    overrides, arguments.labels = without_lists(overrides)
     if "up" not in keys_in(overrides) and tells_superior(arguments.file):
         overrides.append("up=+z")
     given = configuration(name, arguments.file, overrides)
@@ -82,23 +91,44 @@ def run(arguments: argparse.Namespace) -> int:
         is_own = (folder / f"{name}.yaml").exists()
         there, do = ("is there", "replace") if is_own else ("is a data set of texgs", "hide")
         raise ArgumentError(f"{name}: {there} already; choose another --name, or {do} it with --force")
-    field, keys = array_of(given.dataset.volume), keys_in(overrides)
-    channels = channels_of(given.dataset.volume, field)
-    if len(files) == 1 and len(channels) == 1:
-        moments_of(files, given.dataset.volume)  # of a file or folder that has several
-    if field and "reduce" not in keys:
-        given = with_room(given, field, len(channels))
-        keys += ["reduce"] if given.dataset.volume.reduce > 1 else []
-    dataset = with_tfs(given, channels, arguments)
-    text = document(dataset, ["file", *keys])
+    keys = keys_in(overrides)
+    has_labels = arguments.names or arguments.labels or tells_labels(arguments.file)
+    if has_labels and KIND_KEYS.isdisjoint(keys):
+        given = as_labels(given)
+    dataset = data_set(given, files, keys, arguments)
+    text = document(dataset, keys)
     require_read(text, dataset)
     target = write_bytes(folder / f"{name}.yaml", text.encode())
     count, picture = len(dataset.basic_tfs), Path(given.results, name, "transfer", "transfer.png")
-    of = f" of the channels {', '.join(channels)}" if dataset.channels else ""
+    of = f" of the channels {', '.join(dataset.channels)}" if dataset.channels else ""
     functions = "transfer function" if count == 1 else "transfer functions"
     print(f"{short_path(target)}: {count} {functions}{of} to edit; {picture} shows them")
     print(f"then: texgs run dataset={name} fit=quick")
     return 0
+
+
+def data_set(config: Config, files: list[Path], keys: list[str], arguments: argparse.Namespace) -> Dataset:
+    """Read as much of a volume as memory has room for, and return its data set with TFs."""
+    from texgs.edit.series import moments_of
+
+    volume = config.dataset.volume
+    field = array_of(volume)
+    channels = channels_of(volume, field)
+    if not channels and (arguments.tf or arguments.count):
+        word = "--tf" if arguments.tf else "--count"
+        raise ArgumentError(f"{word}: expected none, as each label has a function; labels=[...] chooses some")
+    if len(files) == 1 and len(channels) < 2:
+        moments_of(files, volume)  # of a file or folder that has several
+    found = found_in(config.dataset, arguments.names, next(iter(channels), None) or volume.channel)
+    if field and "reduce" not in keys:
+        config = with_room(config, field, len(channels), len(arguments.labels or found))
+    config = replace(config, dataset=with_chosen(config.dataset, found, arguments.labels, len(channels)))
+    known = read_volume(config, channels)
+    is_said = not KIND_KEYS.isdisjoint(keys) or files or arguments.tf or arguments.count
+    if not is_said and len(channels) == 1 and are_labels(known[""]):
+        rmtree(Path(config.results, config.dataset.name, "volume"))  # of the same samples as values
+        return data_set(as_labels(config), files, keys, arguments)
+    return with_tfs(config, known, channels, arguments)
 
 
 def check_options(arguments: argparse.Namespace) -> None:
@@ -132,13 +162,14 @@ def array_of(volume: VolumeKeys) -> Source | None:
     return None
 
 
-def with_room(config: Config, field: Source, count: int) -> Config:
-    """Return a configuration whose channels take at most half of the free memory; say how."""
+def with_room(config: Config, field: Source, channels: int, labels: int) -> Config:
+    """Return a configuration whose channels and masks take at most half of the free memory; say how."""
     from texgs.volume.prepare import bounds_of
 
     dataset, volume = config.dataset, config.dataset.volume
     samples = prod(end - start for start, end in bounds_of(field.dims, volume.crop))
-    size, factor = count * samples * min(field.dtype.itemsize, SAMPLE_BYTES), 1
+    masks = min(labels, MAX_CHANNELS - channels)  # of a byte each
+    size, factor = samples * (channels * min(field.dtype.itemsize, SAMPLE_BYTES) + masks), 1
     room = max(room_for_volume(), 1)
     while size > room * factor**3:
         factor *= 2
@@ -151,7 +182,9 @@ def with_room(config: Config, field: Source, count: int) -> Config:
 
 
 def channels_of(volume: VolumeKeys, field: Source | None) -> dict[str, Channel | None]:
-    """Return the channels of a file by label or number; by "" where one is read."""
+    """Return the channels of a file by label or number; by "" where one is read; none of labels."""
+    if volume.kind == "labels":
+        return {}
     if field is None or volume.channel or len(field.channels) < 2:
         return {"": None if field is None else field.channel}
     keys = [channel.label for channel in field.channels]
@@ -172,6 +205,8 @@ def configuration(name: str, file: Path, overrides: list[str]) -> Config:
     words = [f"dataset.volume.{word}" for word in ("generator=null", *overrides)]
     config = compose(("tracking=none", *words))
     given = {key: getattr(config.dataset.volume, key) for key in keys_in(overrides)}
+    if given.get("labels"):
+        given["labels"] = absolute(given["labels"])
     return replace(config, dataset=dataset_of(name, absolute(file), **given))
 
 
@@ -192,9 +227,13 @@ def document(dataset: Dataset, keys: list[str]) -> str:
     names = ("name", "title", "volume", *(["series"] if dataset.series else []), "basic_tfs")
     values["basic_tfs"] = {name: plain_tf(tf) for name, tf in dataset.basic_tfs.items()}
     written = {key: values[key] for key in names}
-    written["volume"] = {key: value for key in keys if (value := values["volume"][key]) is not None}
+    volume, default = values["volume"], asdict(VolumeKeys())
+    found = [key for key in ("kind", "reduce", "label_numbers") if volume[key] != default[key]]
+    written["volume"] = {k: volume[k] for k in ["file", *keys, *found] if volume[k] is not None}
     which = "basic TFs of one channel" if dataset.channels else "basic TFs"
     note = f"# Points are [value, opacity] and [value, r, g, b]; the ranges of {which} must not overlap.\n"
+    if dataset.labels:
+        note += "# Values of a label are 0 to 255, and from 127.5 on inside it.\n"
     return note + as_yaml(written)
 
 

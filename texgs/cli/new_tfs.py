@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.project import FORBIDDEN_LETTERS, check_name
-from texgs.core.errors import ArgumentError, ConfigError, TexgsError
+from texgs.config.project import FORBIDDEN_LETTERS, is_name
+from texgs.core.errors import ArgumentError, TexgsError
 
 if TYPE_CHECKING:
     from texgs.config.dataset import Dataset
@@ -20,35 +19,56 @@ if TYPE_CHECKING:
     from texgs.volume.transfer import TransferFunction
 
 
-def with_tfs(config: Config, channels: dict[str, Channel | None], arguments: argparse.Namespace) -> Dataset:
-    """Read the volume, choose TFs of its channels, draw them, and return the data set."""
+def read_volume(config: Config, channels: Mapping[str, Channel | None]) -> dict[str, Any]:
+    """Prepare all channels of a volume, and the labels of basic TFs; return their summaries."""
     from texgs.config.dataset import BasicTF
     from texgs.volume.summaries import read_summaries
-    from texgs.workflow.checks import check_basic_tfs, check_channels
+    from texgs.workflow.checks import check_channels
     from texgs.workflow.execution import ensure
     from texgs.workflow.result import forget
     from texgs.workflow.stage_table import STAGES
 
     dataset = config.dataset
     if len(channels) > 1:
-        dataset = replace(dataset, basic_tfs={key: BasicTF(channel=key) for key in channels})
-        check_channels(dataset)
+        shown = {key: BasicTF(channel=key) for key in channels}
+        dataset = replace(dataset, basic_tfs={**shown, **apart(dataset.basic_tfs, shown)})
+    check_channels(dataset)
     output = Path(config.results, dataset.name, "volume")
     try:
         ensure(STAGES["volume"], replace(config, dataset=dataset))
     except TexgsError:
         forget(output)
         raise
-    known = read_summaries(output / "volume.nrrd")
+    return read_summaries(output / "volume.nrrd")
+
+
+def with_tfs(
+    config: Config,
+    known: dict[str, Any],
+    channels: Mapping[str, Channel | None],
+    arguments: argparse.Namespace,
+) -> Dataset:
+    """Choose TFs of channels beside those of labels, draw them, and return the data set."""
+    from texgs.config.dataset import BasicTF
+    from texgs.workflow.checks import check_basic_tfs
+    from texgs.workflow.execution import ensure
+    from texgs.workflow.stage_table import STAGES
+
+    dataset, listed = config.dataset, {}
     if len(channels) > 1:
         listed = of_each(known, channels, arguments)
-    else:
+    elif channels:
         basic = basic_tfs(dataset.name, known[""], channels[""], arguments.tf, arguments.count)
         listed = {key: BasicTF(**tf.to_dict()) for key, tf in basic.items()}
-    dataset = replace(dataset, basic_tfs=listed)
+    dataset = replace(dataset, basic_tfs={**listed, **apart(dataset.basic_tfs, listed)})
     check_basic_tfs(dataset)
     ensure(STAGES["transfer"], replace(config, dataset=dataset))
     return dataset
+
+
+def apart(labels: Mapping[str, BasicTF], taken: Mapping[str, BasicTF]) -> dict[str, BasicTF]:
+    """Return TFs of labels by names that others do not have."""
+    return {f"label_{name}" if name in taken else name: tf for name, tf in labels.items()}
 
 
 def of_each(
@@ -80,38 +100,23 @@ def tf_names(labels: list[str]) -> list[str]:
     """Return names of TFs like the labels of channels, or with their numbers where these cannot be names."""
     names = [FORBIDDEN_LETTERS.sub("_", label) for label in labels]
     names = [name if name[:1].isalpha() else f"channel_{name}" for name in names]
-    try:
-        for name in names:
-            check_name("dataset.basic_tfs", name)
-    except ConfigError:
-        names = []
-    return names if len(set(names)) == len(labels) else [f"channel_{k}" for k in range(len(labels))]
+    are_names = all(map(is_name, names)) and len(set(names)) == len(labels)
+    return names if are_names else [f"channel_{k}" for k in range(len(labels))]
 
 
 def basic_tfs(
     of: str, summary: Mapping[str, Any], channel: Channel | None, files: list[Path] | None, count: int | None
 ) -> dict[str, TransferFunction]:
     """Return TFs from files, or suggested for a channel or from the histogram in a summary."""
-    import numpy as np
-
-    from texgs.volume.suggest import looks_like_labels, suggest
+    from texgs.volume.suggest import suggest
     from texgs.volume.tf_files import read_tf
 
-    low, high = summary["minimum"], summary["maximum"]
     if not files:
-        histogram = np.array(summary["histogram"])
-        if not summary.get("robust") and looks_like_labels(histogram, high - low):
-            sys.stderr.write(
-                f"{of}: values are in {np.count_nonzero(histogram)} of {len(histogram)} parts of [{low:g}, "
-                f"{high:g}], and are taken for labels. Between two of them rays see those in between, as "
-                "thin shells. If one stands for missing samples, write NaN in its place and add "
-                "nan_value=...\n"
-            )
         return suggest(summary, count, channel)
     basic = {f"TF{index + 1:02}": read_tf(path) for index, path in enumerate(files)}
     for path, tf in zip(files, basic.values(), strict=True):
         first, last = tf.support
-        if last <= 1 < high:
+        if last <= 1 < (high := summary["maximum"]):
             raise ArgumentError(
                 f"{path}: expected values of the data, which go up to {high:g}, got a TF on [{first:g}, "
                 f"{last:g}]; rescale it to the data in ParaView first"

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from texgs.core.keys import REQUIRED, key
-from texgs.volume.basic_tfs import BasicTF, mask_name
+from texgs.core.names import mask_name
+from texgs.volume.basic_tfs import BasicTF
 from texgs.volume.settings import VolumeKeys
 from texgs.volume.view_settings import LARGEST
 
@@ -84,10 +85,6 @@ class Dataset:
         """Return the names of all channels of the prepared volume: those of the image, then masks."""
         own = [] if self.volume.kind == "labels" else self.channels or [""]
         return [*own, *map(mask_name, self.labels)]
-
-    def number_of(self, tf: BasicTF) -> int:
-        """Return the index of a basic TF's channel among the prepared ones."""
-        return self.prepared.index(tf.values_of or "")
 
 
 def dataset_of(

@@ -35,10 +35,9 @@ def with_basic_tf(text: str, name: str, points: BasicTF, framed_by: list[str]) -
 
 
 def plain_tf(points: BasicTF) -> dict[str, Any]:
-    """Return a basic TF as plain values, with its channel if it names one."""
-    return {
-        key: value for key in ("channel", "opacity", "color") if (value := getattr(points, key)) is not None
-    }
+    """Return a basic TF as plain values, with the channel and labels that it names."""
+    keys = ("channel", "label", "within", "opacity", "color")
+    return {key: value for key in keys if (value := getattr(points, key)) is not None}
 
 
 def as_yaml(values: Mapping[str, Any]) -> str:

@@ -11,11 +11,11 @@ from texgs.core.errors import ArgumentError, ConfigError, errors_at
 from texgs.core.io import read_json, write_bytes
 from texgs.core.names import METRICS
 from texgs.scene.scene import Scene
-from texgs.volume.basic_tfs import BasicTF
+from texgs.volume.basic_tfs import basic_tf_of, function_of
 from texgs.volume.framing import frame_of, out_of_frame
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.summaries import read_summaries
-from texgs.volume.transfer import TransferFunction, check_disjoint
+from texgs.volume.transfer import check_disjoint
 
 
 def keep(scene: Scene, name: str) -> str:
@@ -31,20 +31,15 @@ def keep(scene: Scene, name: str) -> str:
     file = file_of(volume.file)
     dataset, text = recompose((f"dataset={file.stem}",)).dataset, file.read_bytes().decode()
     ends = [(each["minimum"], each["maximum"]) for each in read_summaries(volume.file).values()]
-    channel, channels = known[name].channel, dataset.channels
-    low, high = ends[channel]
+    low, high = ends[known[name].channel]
     with errors_at(short_path(file)):
         if name in dataset.basic_tfs:
             raise ArgumentError(f"basic_tfs: {name} is there already; copy the function, or edit the file")
         tf = known[name].rounded(low, high)
         if is_scaled := dataset.tf_values == "fraction":
             tf = known[name].with_values(lambda value: (value - low) / (high - low)).rounded(0, 1)
-        added = BasicTF(**{**tf.to_dict(), "channel": channels[channel] if channels else None})
-        basic_tfs = {**dataset.basic_tfs, name: added}
-        tfs = {
-            key: TransferFunction(tuple(points.opacity), tuple(points.color), dataset.number_of(points))
-            for key, points in basic_tfs.items()
-        }
+        basic_tfs = {**dataset.basic_tfs, name: basic_tf_of(tf, dataset.prepared)}
+        tfs = {key: function_of(points, dataset.prepared) for key, points in basic_tfs.items()}
         tfs = {key: tf.scaled(*ends[tf.channel]) for key, tf in tfs.items()} if is_scaled else tfs
         with errors_at("basic_tfs"):
             check_disjoint(tfs)

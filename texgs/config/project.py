@@ -80,6 +80,15 @@ def check_name(key: str, name: str) -> None:
         raise ConfigError(f"{key}: {name} is a folder of texgs; choose another name")
 
 
+def is_name(name: str) -> bool:
+    """Return whether `check_name` takes a name."""
+    try:
+        check_name("name", name)
+    except ConfigError:
+        return False
+    return True
+
+
 def is_scene_file(base: str) -> bool:
     """Return whether an edit starts from a scene file rather than from another edit."""
     return base.endswith((".yaml", ".yml"))

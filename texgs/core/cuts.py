@@ -67,7 +67,7 @@ class Cuts:
     planes: list[Plane] = field(default_factory=list)
     box: Box | None = None
     faces: str = key("shaded", "by the normal of the plane, unlit, or a slice in grey", choices=FACES)
-    window: list[float] | None = key(None, "values in black and white, of slices", items=(2, 2))
+    window: tuple[float, float] | None = key(None, "values in black and in white, of slices")
 
     def __post_init__(self) -> None:
         if len(self.planes) > MAX_PLANES:

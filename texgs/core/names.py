@@ -43,6 +43,11 @@ def label(where: str, name: object) -> str:
     return text
 
 
+def mask_name(label: str) -> str:
+    """Return the name that the mask of a label has among the channels of a prepared volume."""
+    return f"label {label}"
+
+
 def require_name(name: str | None, where: str) -> None:
     """Require a name that a segment can have."""
     if not name or any(mark in label(where, name) for mark in RESERVED_LETTERS):

@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image, ImageOps
 
 from texgs.core.figures import Cell, Row, as_picture
-from texgs.core.names import style_file
+from texgs.core.names import mask_name, style_file
 from texgs.volume.transfer import TransferFunction
 
 SIDE, INCHES = 512, 3.2  # side of a picture, pixels and inches; the inches determine the font size
@@ -39,7 +39,9 @@ def tf_plot(volume: Path, basic: Mapping[str, TransferFunction]) -> np.ndarray:
     from texgs.volume.tf_plot import plot
 
     known = read_summaries(volume)
-    figure = plot(known, basic, size=(INCHES, INCHES / len(known)), dpi=SIDE / INCHES)
-    for voxels in figure.axes[1::2]:
-        voxels.set_axis_off()  # the number of voxels
+    panels = len({name.startswith(mask_name("")) or name for name in known})  # labels share one
+    figure = plot(known, basic, size=(INCHES, INCHES / panels), dpi=SIDE / INCHES)
+    for axes in figure.axes:
+        if axes.get_ylabel() == "voxels":
+            axes.set_axis_off()
     return np.asarray(as_picture(figure).convert("RGB"))

@@ -172,8 +172,7 @@ def changed_cuts(scene: Scene, key: str, text: str) -> Cuts:
     if key == "faces":
         return cuts_of(plain_cuts(cuts) | {"faces": text or NO_CUTS.faces})
     if key == "window":
-        window = _places(scene, text.split(","), [None] * 2, "LOW,HIGH") if text else None
-        return replace(cuts, window=window)
+        return cuts_of(plain_cuts(cuts) | {"window": _plain(text) if text else None})
     if key and key not in numbers:
         known = ", ".join(f"cut.{each}" for each in ("box", "faces", "window", *numbers))
         raise ArgumentError(f"expected cut, which adds a plane, or one of {known}, got cut.{key}")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
+from texgs.core.names import mask_name
 
 if TYPE_CHECKING:
     from texgs.volume.transfer import TransferFunction
@@ -37,9 +38,24 @@ class BasicTF:
         return self.channel if self.label is None else mask_name(self.label)
 
 
-def mask_name(label: str) -> str:
-    """Return the name that the mask of a label has among the channels of a prepared volume."""
-    return f"label {label}"
+def basic_tf_of(tf: TransferFunction, prepared: Sequence[str]) -> BasicTF:
+    """Return the basic TF of a function of prepared channels, by the names of these."""
+    labels = [
+        name.partition(mask_name(""))[2] if name.startswith(mask_name("")) else None for name in prepared
+    ]
+    channel = None if labels[tf.channel] else prepared[tf.channel] or None
+    within = None if tf.within is None else labels[tf.within]
+    points = tf.to_dict()
+    return BasicTF(points["opacity"], points["color"], channel, labels[tf.channel], within)
+
+
+def function_of(tf: BasicTF, prepared: Sequence[str]) -> TransferFunction:
+    """Return the function of prepared channels, by their names, that a basic TF is; of values as given."""
+    from texgs.volume.transfer import TransferFunction
+
+    mask = None if tf.within is None else prepared.index(mask_name(tf.within))
+    of = prepared.index(tf.values_of or "")
+    return TransferFunction(tuple(tf.opacity), tuple(tf.color), of, mask)
 
 
 def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) -> dict[str, TransferFunction]:
@@ -48,15 +64,14 @@ def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) ->
 
     known, functions = read_summaries(volume), {}
     for name, each in points.items():
-        wanted = each.values_of or ""
+        wanted = each.values_of or "" if len(known) > 1 else next(iter(known))
         mask = None if each.within is None else mask_name(each.within)
-        for channel in [wanted] * (len(known) > 1) + [mask] * (mask is not None):
-            if channel not in known:
-                raise ArgumentError(
-                    f"basic TF {name}: expected a channel of {volume} ({', '.join(known)}), got "
-                    f"{channel or None}"
-                )
-        number = [*known].index(wanted) if wanted in known else 0
+        if missing := {wanted, mask or wanted} - known.keys():
+            raise ArgumentError(
+                f"basic TF {name}: expected a channel of {volume} ({', '.join(known)}), got "
+                f"{missing.pop() or None}"
+            )
+        number = [*known].index(wanted)
         summary = [*known.values()][number]
         tf = in_data_values(name, each, tf_values, summary["minimum"], summary["maximum"], number)
         functions[name] = tf if mask is None else replace(tf, within=[*known].index(mask))

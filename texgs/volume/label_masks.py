@@ -4,6 +4,7 @@ Between the numbers of two labels lie those of others, so that labels are not in
 """
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -33,8 +34,14 @@ class MaskSource(Source):
     """
 
     def __init__(self, labels: Source, number: int, name: str = "") -> None:
-        told = f"{labels.name}: label {name or number}"
-        super().__init__(told, labels.dims, np.dtype(np.uint8), labels.spacing, labels.origin)
+        super().__init__(
+            f"label {name or number} of {labels.name}",
+            labels.dims,
+            np.dtype(np.uint8),
+            labels.spacing,
+            labels.origin,
+        )
+        self.label = name or str(number)
         self._labels, self._number, self.space, self.note = labels, number, labels.space, labels.note
 
     def slices(self, start: int, stop: int) -> np.ndarray:
@@ -57,24 +64,23 @@ def softened(mask: np.ndarray) -> np.ndarray:
     return soft
 
 
-def label_counts(labels: Source) -> dict[int, int]:
-    """Count the samples of each label but 0, the largest first; reads the volume once, slab by slab.
+def label_counts(labels: Source, bounds: Sequence[tuple[int, int]] = ()) -> dict[int, int]:
+    """Count the samples of each label but 0 within bounds, the largest first; reads them once.
 
     Raises:
-        ArgumentError: if a sample is no whole number, or there is no label.
+        ArgumentError: if a sample is no whole number.
     """
     counts: Counter[int] = Counter()
-    for bounds in slab_bounds(labels, 0, labels.dims[2]):
-        numbers, each = np.unique(labels.slices(*bounds), return_counts=True)
-        if (bad := numbers != np.rint(numbers)).any():
+    (x0, x1), (y0, y1), (z0, z1) = bounds or [(0, size) for size in labels.dims]
+    for slab in slab_bounds(labels, z0, z1):
+        numbers, each = np.unique(labels.slices(*slab)[:, y0:y1, x0:x1], return_counts=True)
+        if (bad := ~np.isfinite(numbers) | (numbers != np.rint(numbers))).any():
             raise ArgumentError(
                 f"{labels.name}: expected labels, which are whole numbers, got {numbers[bad][0]:g}; is it "
                 "an image?"
             )
         counts.update(dict(zip(map(int, numbers.tolist()), each.tolist(), strict=True)))
     del counts[0]
-    if not counts:
-        raise ArgumentError(f"{labels.name}: expected labels, got 0 everywhere")
     return dict(counts.most_common())
 
 

@@ -1,11 +1,12 @@
 """NIfTI, ANALYZE and MGH, by nibabel: ITK knows neither NIfTI-2 nor axes that are not at right angles."""
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import reading_as
 from texgs.volume.axes import Axis, place_on
 from texgs.volume.grid import Grid, Triple, check_lattice, dims_of, require_room
@@ -54,6 +55,16 @@ def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None, time: 
     source = ArraySource(Grid(values.T, spacing or (dx, dy, dz), origin or first, space=space), path.name)
     source.n_steps, source.note = n_steps, "; ".join(filter(None, (step_note(time, n_steps), remark)))
     return source
+
+
+def is_label_image(path: Path) -> bool:
+    """Return whether the header of an image of NIfTI says that samples are labels."""
+    import nibabel
+
+    with suppress(TexgsError), reading_as("a NIfTI file"):  # who reads its samples will say more
+        image = nibabel.load(path)
+        return isinstance(image, nibabel.Nifti1Pair) and image.header.get_intent()[0] == "label"
+    return False
 
 
 def _space_of(image: Any) -> tuple[np.ndarray, str, str, str]:

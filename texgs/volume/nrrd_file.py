@@ -1,6 +1,8 @@
 """The canonical file of a prepared volume: an NRRD with raw samples, mapped into memory."""
 
+import json
 import re
+from collections.abc import Sequence
 from math import hypot
 from pathlib import Path
 from typing import BinaryIO
@@ -10,7 +12,7 @@ import numpy as np
 from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import reading_as
 from texgs.volume.grid import Dims, Grid, Triple, byte_count
-from texgs.volume.headers import UPRIGHT_SPACING, read_fields, spacing_in, unit_in
+from texgs.volume.headers import NRRD, UPRIGHT_SPACING, read_fields, spacing_in, unit_in
 from texgs.volume.slabs import RawSource
 from texgs.volume.space import UNKNOWN_SPACE, Space
 
@@ -23,6 +25,7 @@ NRRD_TYPES = {
     "float32": "float",
 }
 MASKS = "masksoflabels"  # our own key: how many masks follow the samples that the header tells of
+LABELS = "labelsofmasks"  # our own key: labels whose masks are last, as JSON
 REMEDY = "texgs volume dataset=NAME makes it"
 NUMBER = re.compile(r"[-+.\deE]+")
 
@@ -61,7 +64,18 @@ def open_prepared(path: Path) -> list[RawSource]:
         channels = [RawSource(path, (nx, ny, nz), stored, each, *lattice) for each in offsets]
         behind, byte = offset + count * size, np.dtype(np.uint8)
         offsets = (behind + k * nx * ny * nz for k in range(int(fields.get(f"{MASKS}=", "0"))))
-        return channels + [RawSource(path, (nx, ny, nz), byte, each, *lattice) for each in offsets]
+        channels += [RawSource(path, (nx, ny, nz), byte, each, *lattice) for each in offsets]
+        labels = json.loads(fields.get(f"{LABELS}=", "[]"))
+        for channel, label in zip(channels[::-1], labels[::-1], strict=False):
+            channel.label = str(label)
+        return channels
+
+
+def masks_in(path: Path) -> dict[str, RawSource]:
+    """Return the masks in a prepared volume, by labels; none in other files."""
+    if path.suffix.lower() not in NRRD or f"{LABELS}=" not in read_fields(path)[0]:
+        return {}
+    return {each.label: each for each in open_prepared(path) if each.label is not None}
 
 
 def write_header(
@@ -73,11 +87,12 @@ def write_header(
     space: Space,
     channels: int,
     masks: int = 0,
+    labels: Sequence[str] = (),
 ) -> int:
     """Write the header of a canonical file, and return its length, a multiple of `ALIGNMENT` bytes.
 
     Raw samples follow, little endian, of one of the types in `NRRD_TYPES`; of one channel after the other;
-    and then masks, uint8, which other programs leave unread.
+    and then masks, uint8, which other programs leave unread. Labels are those of the last channels or masks.
     """
     vectors = (space.axes * np.array(spacing)[:, None]).tolist()
     directions = " ".join(map(_vector, vectors))
@@ -99,6 +114,7 @@ def write_header(
         f"space origin: {_vector(origin)}",
         *(pair if space.matrix != UNKNOWN_SPACE.matrix else []),
         *([f"{MASKS}:={masks}"] if masks else []),
+        *([f"{LABELS}:={json.dumps(labels)}"] if labels else []),
     ]
     text = ("\n".join(lines) + "\n#").encode()
     # The comment fills up; two line breaks end it and the header.

@@ -13,7 +13,7 @@ from texgs.core.io import write_atomic
 from texgs.core.memory import GIB
 from texgs.core.names import check_count, is_number
 from texgs.volume.grid import UPRIGHT, AxisPermutation, Dims, Triple, permuted_lattice, permuted_values
-from texgs.volume.label_masks import MaskSource
+from texgs.volume.label_masks import HALF
 from texgs.volume.nrrd_file import NRRD_TYPES, open_prepared, write_header
 from texgs.volume.slabs import Source, slab_bounds
 from texgs.volume.space import Space
@@ -66,8 +66,10 @@ def prepare_channels(
             an axis, or there is too little space on the disk. Nothing is written then.
     """
     _check_keys(nan_value, reduce, method, up)
-    source, tallies = _first_of(sources), [_Tally(each.name) for each in sources]
-    count = sum(isinstance(each, MaskSource) for each in sources) if not isinstance(source, MaskSource) else 0
+    source = _first_of(sources)
+    tallies = [_Tally(each.name, each.label is not None) for each in sources]
+    labels = [each.label for each in sources if each.label is not None]
+    count = len(labels) % len(sources)  # of masks behind an image
     bounds, axes = bounds_of(source.dims, crop), UPRIGHT[up]
     dims, spacing, origin, space = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
     dtypes = [_kept(each.dtype) for each in sources]
@@ -76,7 +78,7 @@ def prepare_channels(
     def write(file: BinaryIO) -> None:
         _require_disk(source.name, target, sum(sizes))
         channels = len(sources) - count
-        offset = write_header(file, dims, dtypes[0], spacing, origin, space, channels, count)
+        offset = write_header(file, dims, dtypes[0], spacing, origin, space, channels, count, labels)
         offsets = [offset, *(offset + np.cumsum(sizes)).tolist()]
         slabs = slab_bounds(source, z0, z1, multiple=reduce)
         steps = [(number, *slab) for number in range(len(sources)) for slab in slabs]
@@ -111,7 +113,7 @@ def _first_of(sources: Sequence[Source]) -> Source:
     """Return the first of some channels, and require of the others that they are like it; masks are uint8."""
     first, *others = sources
     for each in others:
-        is_alike = isinstance(each, MaskSource) or each.dtype == first.dtype
+        is_alike = each.label is not None or each.dtype == first.dtype
         if not is_alike or (each.dims, each.spacing) != (first.dims, first.spacing):
             raise ArgumentError(
                 f"{first.name}: expected channels of one lattice and type; choose some of them"
@@ -135,8 +137,8 @@ def _require_disk(name: str, target: Path, needed: int) -> None:
 class _Tally:
     """Range and bad samples of a stream."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
+    def __init__(self, name: str, is_mask: bool) -> None:
+        self.name, self.is_mask = name, is_mask
         self.minimum, self.maximum = inf, -inf
         self.low, self.high = inf, -inf  # of values that a sample shares with one beside it, along x or y
         self.varies, self.sample = False, None  # before samples become those of the file
@@ -166,11 +168,15 @@ class _Tally:
         return block
 
     def check(self) -> None:
-        """Refuse a volume with bad samples, or with one value only."""
+        """Refuse a volume with bad samples, or with one value only, and a mask without any inside."""
         if self.first:
             raise ArgumentError(
                 f"{self.name}: expected finite samples, got {self.n_bad} that are NaN or infinite, the first "
                 f"at (x, y, z) = {self.first}; set nan_value to replace them"
+            )
+        if self.is_mask and self.maximum < HALF:
+            raise ArgumentError(
+                f"{self.name}: expected some samples, got none in the crop, or too few for reduce"
             )
         if self.minimum == self.maximum and self.varies:
             raise ArgumentError(

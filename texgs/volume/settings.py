@@ -13,7 +13,6 @@ from texgs.core.keys import key
 from texgs.core.names import file_name
 
 if TYPE_CHECKING:
-    from texgs.volume.label_masks import MaskSource
     from texgs.volume.slabs import Source
     from texgs.volume.summaries import Summary
 
@@ -125,30 +124,38 @@ def open_field(volume: VolumeKeys, path: Path | None) -> Source:
 
 def open_masks(
     volume: VolumeKeys, path: Path, names: Sequence[str], image: Source | None = None
-) -> list[MaskSource]:
+) -> Sequence[Source]:
     """Return the masks of labels in a file, by names or numbers; on the lattice of an image, if any.
+
+    A volume that texgs has prepared has masks instead of labels.
 
     Raises:
         ArgumentError: if the file has no such label, or another lattice than the image.
     """
-    from texgs.volume.label_masks import MaskSource, on_lattice_of
+    from texgs.volume.label_masks import MaskSource
     from texgs.volume.label_names import place_of_label
+    from texgs.volume.nrrd_file import masks_in
 
+    if made := masks_in(path):
+        return [made[name] for name in names]
     layers: dict[str | None, Source] = {}
-    masks = []
+    masks: list[Source] = []
     for name in names:
         layer, number = place_of_label(path, name, volume.label_numbers)
         if layer not in layers:
-            own = replace(volume, channel=layer) if image is None else beside(volume, layer)
-            opened = open_field(own, path)
-            layers[layer] = opened if image is None else on_lattice_of(opened, image)
+            layers[layer] = open_labels(volume, path, layer, image)
         masks.append(MaskSource(layers[layer], number, name))
     return masks
 
 
-def beside(volume: VolumeKeys, layer: str | None) -> VolumeKeys:
-    """Return how a file of labels beside an image is read: at the place that settings give the image."""
-    return VolumeKeys(spacing=volume.spacing, origin=volume.origin, channel=layer)
+def open_labels(volume: VolumeKeys, path: Path, layer: str | None, image: Source | None = None) -> Source:
+    """Return a layer of the labels in a file; beside an image, at the place that settings give this."""
+    from texgs.volume.label_masks import on_lattice_of
+
+    if image is None:
+        return open_field(replace(volume, channel=layer or volume.channel), path)
+    beside = VolumeKeys(spacing=volume.spacing, origin=volume.origin, channel=layer)
+    return on_lattice_of(open_field(beside, path), image)
 
 
 def cached_volume(volume: VolumeKeys) -> Path:

@@ -22,6 +22,7 @@ class Source(ABC):
     channels: Sequence[Channel] = ()  # channels of the file; this is one of them
     channel: Channel | None = None
     space = UNKNOWN_SPACE
+    label: str | None = None  # of which this is the mask
 
     def __init__(self, name: str, dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple) -> None:
         check_lattice(dims, dtype, spacing, origin)

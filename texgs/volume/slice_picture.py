@@ -26,7 +26,7 @@ from texgs.volume.slices import (
 )
 from texgs.volume.space import LETTERS
 
-CROSS, LETTER = "#f2b134", "#8ab8ff"
+CROSS, LETTER, LETTER_SIZE = "#f2b134", "#8ab8ff", 16  # colours, and pixels
 GAP = 6  # pixels between pictures, and around letters
 LARGEST = 16384  # pixels of a side
 
@@ -83,7 +83,7 @@ def marked(pixels: np.ndarray, plane: SlicePlane, size: tuple[int, int], at: Seq
     y = (0.5 - rise * at[up] / (plane.size[1] * plane.spacing[1])) * height
     draw.line((0, y, width, y), CROSS)
     draw.line((x, 0, x, height), CROSS)
-    font = ImageFont.load_default(max(10, min(size) // 20))
+    font = ImageFont.load_default(LETTER_SIZE)
     ends = ((GAP, height / 2), (width - GAP, height / 2), (width / 2, height - GAP), (width / 2, GAP))
     for letter, end, anchor in zip(plane.ends, ends, ("lm", "rm", "md", "ma"), strict=True):
         draw.text(end, letter, LETTER, font, anchor, stroke_width=1, stroke_fill="black")
@@ -109,6 +109,7 @@ def words_at(grid: Grid, point: Sequence[float], labels: Labels) -> str:
     letters, words = LETTERS.get(grid.space.name, ("XYZ", ""))[0], list[str]()
     if place := place_at(grid, point):
         where = ", ".join(f"{letter} {x:.4g}" for letter, x in zip(letters, place.position, strict=True))
-        words = [f"{where} {grid.space.unit}".rstrip(), f"value {place.value:g}"]
+        value = [f"value {place.value:g}"] if all(channel for channel, _ in labels.values()) else []
+        words = [f"{where} {grid.space.unit}".rstrip(), *value]
     masks = {name: place_at(grid, point, channel) for name, (channel, _) in labels.items()}
     return "; ".join([*words, *(name for name, mask in masks.items() if mask and mask.value >= HALF)])

@@ -12,9 +12,10 @@ from texgs.core.io import reading_as
 from texgs.volume.foreign import DICOM, VTK_SUFFIXES, open_foreign
 from texgs.volume.grid import Triple
 from texgs.volume.headers import METAIMAGE, NRRD, require_itself
+from texgs.volume.label_names import SEGMENTATION
 from texgs.volume.mrc import MAP_SUFFIXES, open_mrc
 from texgs.volume.netcdf import open_netcdf
-from texgs.volume.nifti import NIBABEL_SUFFIXES, open_nifti
+from texgs.volume.nifti import NIBABEL_SUFFIXES, is_label_image, open_nifti
 from texgs.volume.ome_zarr import is_zarr, open_zarr
 from texgs.volume.plain import open_npy, open_raw, open_text
 from texgs.volume.slabs import Source
@@ -116,6 +117,13 @@ def tells_superior(path: Path) -> bool:
     """Return whether z points to the head in the format, as in NIfTI and DICOM."""
     kind = _format(path)
     return kind is not None and kind.is_superior
+
+
+def tells_labels(path: Path) -> bool:
+    """Return whether a file itself says that it holds labels: segments of 3D Slicer, or NIfTI's intent."""
+    if _suffix(path) not in NIBABEL_SUFFIXES or not path.is_file():
+        return path.name.lower().endswith(SEGMENTATION)
+    return is_label_image(path)
 
 
 def _format(path: Path) -> Format | None:

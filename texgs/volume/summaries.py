@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from texgs.core.io import read_json, write_json
+from texgs.core.names import mask_name
 from texgs.volume.grid import Dims, Triple
 from texgs.volume.slabs import Source, slab_bounds
 from texgs.volume.space import UNKNOWN_SPACE, Space
@@ -132,9 +133,9 @@ def summary_file(volume: Path) -> Path:
 
 
 def write_summaries(volume: Path, summaries: Sequence[Summary], channels: Sequence[str]) -> Path:
-    """Write the summaries of a volume.nrrd; those of several channels by their labels, below the first."""
+    """Write the summaries of a volume.nrrd; those of several channels or masks by name, below the first."""
     said = asdict(summaries[0])
-    if len(summaries) > 1:
+    if len(summaries) > 1 or channels[0].startswith(mask_name("")):
         said["channels"] = dict(zip(channels, map(asdict, summaries), strict=True))
     return write_json(summary_file(volume), said)
 

@@ -1,4 +1,4 @@
-"""A plot of transfer functions over the histogram of their volume, with casts of each."""
+"""A plot of transfer functions over the histogram of their volume, and of sizes of labels, with casts."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import numpy as np
 from texgs.core.camera import orbit
 from texgs.core.figures import new_figure, words
 from texgs.core.light import Light
+from texgs.core.names import mask_name
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.grid import Grid
+from texgs.volume.label_masks import HALF
 from texgs.volume.overlay import overlays
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 PLOT_INCHES, DPI = (10.0, 4.5), 100  # inches, dots per inch: plots by themselves have 1000 x 450 pixels
 SAMPLES = 512
 CAST_PIXELS, CAST_INCHES = 160, 1.9  # pixels of a side of a cast, height of the row of them
+CASTS = 6  # casts of labels in a row
 
 
 def plot(
@@ -37,22 +40,27 @@ def plot(
     """Return a figure of basic transfer functions over the histograms of a volume's channels, see `Summary`.
 
     Opacity is the height of each coloured area; the grey area is the number of voxels, on a log axis, of
-    integers as if each bin held equally many. Channels are one below the other, with their labels; casts of
-    functions are the last row.
+    integers as if each bin held equally many. Channels are one below the other, with their labels; then the
+    sizes of labels, and casts of functions as the last rows.
     """
-    heights = [*[size[1]] * len(channels), *[CAST_INCHES] * bool(casts)]
+    masks = [label for label in channels if label.startswith(mask_name(""))]
+    taken, shown = len(channels) - len(masks), list((casts or {}).items())
+    line = len(shown) if not masks else CASTS
+    lines = [dict(shown[start : start + line]) for start in range(0, len(shown), line or 1)]
+    heights = [*[size[1]] * (taken + bool(masks)), *[CAST_INCHES] * len(lines)]
     figure = new_figure(size[0], sum(heights), dpi)
     rows = figure.subplots(len(heights), squeeze=False, height_ratios=heights)[:, 0]
-    for number, (label, summary) in enumerate(channels.items()):
+    for number, (label, summary) in enumerate([*channels.items()][:taken]):
         own = {name: tf for name, tf in basic.items() if tf.channel == number}
         above = ", ".join(filter(None, (title, label)))
         _fill(rows[number], {**summary, **(summary.get("robust") or {})}, own, above)
-    if casts:
-        rows[-1].imshow(np.concatenate([*casts.values()], axis=1))
-        rows[-1].set(
-            xticks=CAST_PIXELS * (np.arange(len(casts)) + 0.5), xticklabels=map(words, casts), yticks=[]
-        )
-        rows[-1].set_frame_on(False)
+    if masks:
+        _fill_sizes(rows[taken], [*channels.values()], basic, taken)
+        rows[taken].set_title("" if taken else words(title))
+    for axes, casts in zip(rows[len(rows) - len(lines) :], lines, strict=True):
+        axes.imshow(np.concatenate([*casts.values()], axis=1))
+        axes.set(xticks=CAST_PIXELS * (np.arange(len(casts)) + 0.5), xticklabels=map(words, casts), yticks=[])
+        axes.set_frame_on(False)
     return figure
 
 
@@ -63,6 +71,24 @@ def casts_of(grid: Grid, basic: Mapping[str, TransferFunction]) -> dict[str, np.
     shown = {name: [tf] for name, tf in basic.items()} | {"all": overlays(basic)}
     casts = {name: caster.cast(tfs, camera, light, by_cell=False).rgba.numpy() for name, tfs in shown.items()}
     return {name: (rgba[..., :3] + 1 - rgba[..., 3:]).clip(0, 1) for name, rgba in casts.items()}
+
+
+def _fill_sizes(
+    axes: Axes, channels: list[Mapping[str, Any]], basic: Mapping[str, TransferFunction], first: int
+) -> None:
+    """Draw a bar for the size of each label, whose channels are those from `first` on."""
+    labels = {name: tf for name, tf in basic.items() if tf.channel >= first}
+    unit = channels[first]["space"]["unit"]
+    for name, tf in reversed(labels.items()):
+        summary = channels[tf.channel]
+        counts = np.asarray(summary["histogram"])
+        edges = np.linspace(summary["minimum"], summary["maximum"], len(counts) + 1)
+        inside = counts[edges[1:] > HALF].sum()
+        size = inside * (np.prod(summary["spacing"]) if unit else 1)
+        bar = axes.barh(words(name), size, color=tf.color[0][1:])
+        axes.bar_label(bar, [f"{size:,.0f}" if size >= 1000 else f"{size:.3g}"], padding=4)
+    axes.margins(x=0.12)
+    axes.set_xlabel(f"{unit}³" if unit else "samples")
 
 
 def _fill(

@@ -12,7 +12,7 @@ from texgs.edit.method import NO_METHOD, method_of, methods
 from texgs.fields.kinds import Kind, kinds, require
 from texgs.fields.surfels.material import require_material
 from texgs.fitting.kinds import fit_specs
-from texgs.volume.basic_tfs import mask_name
+from texgs.volume.basic_tfs import function_of
 from texgs.volume.grid import MAX_CHANNELS
 from texgs.workflow.edits import OF_ONE, chain_of, looks_of, require_parts
 from texgs.workflow.inputs import scene_before
@@ -53,15 +53,13 @@ def check_edit(config: Config) -> None:
 
 def check_basic_tfs(dataset: Dataset) -> None:
     """Check the points of all basic TFs of a data set, and that their ranges do not overlap."""
-    from texgs.volume.transfer import TransferFunction, check_disjoint
+    from texgs.volume.transfer import check_disjoint
 
     check_channels(dataset)
     basic = {}
     for name, points in dataset.basic_tfs.items():
         with errors_at(f"{dataset.name}: basic TF {name}"):
-            opacity, color = tuple(points.opacity), tuple(points.color)
-            mask = None if points.within is None else dataset.prepared.index(mask_name(points.within))
-            basic[name] = TransferFunction(opacity, color, dataset.number_of(points), mask)
+            basic[name] = function_of(points, dataset.prepared)
     with errors_at(f"{dataset.name}: basic TFs", " "):
         check_disjoint(basic)
 

@@ -62,6 +62,16 @@ class Page extends ScenePage {
     this.looks?.paint();
   }
 
+<<<<<<< HEAD
+=======
+  #addSlices({ slices, space }) {
+    const made = new Slices(remoteSlices(slices), space ?? { axes: "xyz", unit: "" },
+      (text) => this.notices.tell(text, "error"));
+    made.addEventListener("click", () => this.measure.click(made.point));
+    this.addMark(new SlicesInScene(this, made, () => this.segments.isLocked || this.measure.isOn));
+  }
+
+>>>>>>> labels
   #segment(model) {
     if (!this.mayBegin()) return;
     this.looks.leave();

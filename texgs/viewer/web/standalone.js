@@ -10,6 +10,11 @@ import { drawMarks } from "./picture_marks.js";
 import { ScenePage } from "./scene_page.js";
 import { PictureDialog } from "./size_inputs.js";
 import { inFile } from "./space.js";
+<<<<<<< HEAD
+=======
+import { Slices } from "./slices.js";
+import { SlicesInScene } from "./slices_in_scene.js";
+>>>>>>> labels
 import { State, difference } from "./state.js";
 import { TimeSlider } from "./time.js";
 import { TransferEditor } from "./transfer.js";
@@ -40,6 +45,17 @@ class StandalonePage extends ScenePage {
     this.follow();
   }
 
+<<<<<<< HEAD
+=======
+  #addSlices({ space }) {
+    const source = new PageSlices(this.renderer.samples, this.state);
+    const slices = new Slices(source, space ?? { axes: "xyz", unit: "" }, (text) => this.notices.tell(text, "error"));
+    get("slices").append(element("p", { className: "hint" }, source.words));
+    slices.addEventListener("click", () => this.measure.click(slices.point));
+    this.addMark(new SlicesInScene(this, slices, () => this.measure.isOn));
+  }
+
+>>>>>>> labels
   draw(moving) {
     super.draw(moving);
     this.compare?.show();

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from texgs.core.memory import free_memory
+from texgs.core.names import mask_name
 from texgs.report.results import Result
 from texgs.volume.basic_tfs import BasicTF, basic_tfs_of
 from texgs.workflow.inputs import has_volume, prepared_volume
@@ -52,7 +53,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     for name, tf in basic.items():
         write_paraview(output / f"{name}.paraview.json", tf, f"{settings.dataset} {name}")
     ranges = {name: list(tf.support) for name, tf in basic.items()}
-    return Outcome(TransferResult(len(basic), ranges))
+    has_labels_only = all(name.startswith(mask_name("")) for name in channels)
+    shown = {"transfer.png": "Sizes of the labels, and a view of each."} if has_labels_only else None
+    return Outcome(TransferResult(len(basic), ranges), shown)
 
 
 STAGE = Stage(

@@ -1,0 +1,64 @@
+"""Labels of a volume in Python, alone or beside an image: their masks, and the names of their functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from texgs.config.dataset_labels import named
+from texgs.core.errors import ArgumentError
+from texgs.core.names import check_count
+from texgs.volume.grid import MAX_CHANNELS
+from texgs.volume.label_choice import choose, labels_in
+from texgs.volume.label_masks import MaskSource, on_lattice_of
+from texgs.volume.label_names import Label, named_in, read_table
+from texgs.volume.slabs import Source
+
+
+def sources_of(
+    data: Any,
+    open_file: Callable[..., Source],
+    kind: str,
+    labels: Any,
+    table: str | Path | None,
+    crop: Sequence[int] | None,
+    reduce: int,
+) -> tuple[dict[str, Label], list[Source]]:
+    """Return labels by the names of their functions, and an image, if there is one, before their masks.
+
+    Args:
+        data: a file or an array, of an image or of labels.
+        open_file: returns its samples, where labels overlap those of a layer.
+        kind: of the data.
+        labels: of an image a file or an array; of labels the names or numbers of those that are shown.
+        table: names and colours, see `texgs.volume.label_names.read_table`.
+        crop: as for `texgs.Volume`.
+        reduce: the same; a label of fewer samples than a block is only shown where it is wanted.
+    """
+    if kind not in ("image", "labels"):
+        raise ArgumentError(f"kind: expected image or labels, got {kind!r:.100}")
+    check_count("reduce", reduce)
+    images = [open_file(data, None)] if kind == "image" else []
+    if images and labels is None:
+        return {}, images
+    of, wanted = (labels, None) if images else (data, labels)
+    if isinstance(wanted, str) or not isinstance(wanted, Sequence | None):
+        raise ArgumentError(f"labels: expected names or numbers, as in [3, 'liver'], got {wanted!r:.100}")
+
+    @cache
+    def layer_of(layer: str | None) -> Source:
+        if not images:
+            return open_file(of, layer)
+        return on_lattice_of(open_file(of, layer, name="labels", keys={}), images[0])
+
+    path = None if table is None else Path(table)
+    if isinstance(of, str | Path):
+        known, _ = named_in(Path(of), path)
+    else:
+        known = [] if path is None else read_table(path)
+    words = None if wanted is None else [*map(str, wanted)]
+    chosen = choose(labels_in(layer_of, known, crop), words, MAX_CHANNELS - len(images), reduce**3)
+    masks = [MaskSource(layer_of(each.layer), each.number, each.name) for each in chosen]
+    return named(chosen), [*images, *masks]
