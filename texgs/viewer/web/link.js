@@ -3,6 +3,7 @@
 import { timesOf } from "./state.js";
 
 const MOST = 1e6; // of a coordinate
+>>>>>>> p
 const MOST_FACTOR = 1000, MOST_PLANES = 6, MOST_REACH = 2, MOST_MARKERS = 100, MOST_LETTERS = 200;
 
 /** A number between two others; nothing else. */

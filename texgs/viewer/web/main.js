@@ -62,6 +62,7 @@ class Page extends ScenePage {
     this.looks?.paint();
   }
 
+>>>>>>> p
   #segment(model) {
     if (!this.mayBegin()) return;
     this.looks.leave();
