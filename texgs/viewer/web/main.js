@@ -62,7 +62,6 @@ class Page extends ScenePage {
     this.looks?.paint();
   }
 
->>>>>>> p
   #segment(model) {
     if (!this.mayBegin()) return;
     this.looks.leave();

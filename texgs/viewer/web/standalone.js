@@ -10,7 +10,6 @@ import { drawMarks } from "./picture_marks.js";
 import { ScenePage } from "./scene_page.js";
 import { PictureDialog } from "./size_inputs.js";
 import { inFile } from "./space.js";
->>>>>>> p
 import { State, difference } from "./state.js";
 import { TimeSlider } from "./time.js";
 import { TransferEditor } from "./transfer.js";
@@ -41,7 +40,6 @@ class StandalonePage extends ScenePage {
     this.follow();
   }
 
->>>>>>> p
   draw(moving) {
     super.draw(moving);
     this.compare?.show();
