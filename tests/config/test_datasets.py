@@ -15,7 +15,7 @@ from tests.report.written import lines
 from tests.shipped import DATASETS, ROOT, tracked
 from texgs.config.compose import compose
 from texgs.core.errors import ConfigError
-from texgs.volume.basic_tfs import in_data_values
+from texgs.volume.basic_tfs import function_of, in_data_values
 from texgs.volume.label_masks import label_counts
 from texgs.volume.sources import open_source
 from texgs.workflow.checks import check_basic_tfs
@@ -68,8 +68,9 @@ def test_is_named_like_its_file_and_says_who_made_it_and_has_one_source(name):
 
 @pytest.mark.parametrize("name", with_values("fraction"))
 def test_fractions_of_a_range_map_to_data_values(name):
-    for tf, points in dataset(name).basic_tfs.items():
-        first, last = in_data_values(tf, points, "fraction", -2.0, 3.0).support
+    for points in dataset(name).basic_tfs.values():
+        tf = function_of(points, dataset(name).prepared)
+        first, last = in_data_values(tf, "fraction", -2.0, 3.0).support
         assert -2.0 <= first < last <= 3.0
 
 
@@ -122,8 +123,9 @@ def test_agrees_with_the_real_volume(name, manifest):
     if name in PAPER:
         assert source.dims == dims_of(name)
     low, high = (0, 255) if config.volume.kind == "labels" else (known["min"], known["max"])
-    for tf, points in config.basic_tfs.items():
-        first, last = in_data_values(tf, points, "data", low, high).support
+    for points in config.basic_tfs.values():
+        tf = function_of(points, config.prepared)
+        first, last = in_data_values(tf, "data", low, high).support
         assert low <= first < last <= high
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.keys import key
 from texgs.core.names import mask_name
 
@@ -50,12 +50,19 @@ def basic_tf_of(tf: TransferFunction, prepared: Sequence[str]) -> BasicTF:
 
 
 def function_of(tf: BasicTF, prepared: Sequence[str]) -> TransferFunction:
-    """Return the function of prepared channels, by their names, that a basic TF is; of values as given."""
+    """Return the function of prepared channels, by their names, that a basic TF is; of values as given.
+
+    Raises:
+        ArgumentError: if it is of another channel, where there are several, or its points are malformed.
+    """
     from texgs.volume.transfer import TransferFunction
 
-    mask = None if tf.within is None else prepared.index(mask_name(tf.within))
-    of = prepared.index(tf.values_of or "")
-    return TransferFunction(tuple(tf.opacity), tuple(tf.color), of, mask)
+    wanted = [(tf.values_of or "") if len(prepared) > 1 else prepared[0]]
+    wanted += [] if tf.within is None else [mask_name(tf.within)]
+    for each in wanted:
+        if each not in prepared:
+            raise ArgumentError(f"expected a channel of {', '.join(prepared)}, got {each or None}")
+    return TransferFunction(tuple(tf.opacity), tuple(tf.color), *map(prepared.index, wanted))
 
 
 def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) -> dict[str, TransferFunction]:
@@ -64,43 +71,23 @@ def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) ->
 
     known, functions = read_summaries(volume), {}
     for name, each in points.items():
-        wanted = each.values_of or "" if len(known) > 1 else next(iter(known))
-        mask = None if each.within is None else mask_name(each.within)
-        for channel in (wanted if len(known) > 1 else None, mask):
-            if channel is not None and channel not in known:
-                expected = f"expected a channel of {volume} ({', '.join(known)})"
-                raise ArgumentError(f"basic TF {name}: {expected}, got {channel or None}")
-        number = [*known].index(wanted) if wanted in known else 0
-        summary = [*known.values()][number]
-        tf = in_data_values(name, each, tf_values, summary["minimum"], summary["maximum"], number)
-        functions[name] = tf if mask is None else replace(tf, within=[*known].index(mask))
+        with errors_at(f"basic TF {name}"):
+            tf = function_of(each, [*known])
+            summary = [*known.values()][tf.channel]
+            functions[name] = in_data_values(tf, tf_values, summary["minimum"], summary["maximum"])
     return functions
 
 
-def in_data_values(
-    name: str, points: BasicTF, tf_values: str, low: float, high: float, channel: int = 0
-) -> TransferFunction:
-    """Return a basic TF in the units of the data.
+def in_data_values(tf: TransferFunction, tf_values: str, low: float, high: float) -> TransferFunction:
+    """Return a function in the units of data from low to high.
 
-    Args:
-        name: of the TF, for messages.
-        points: of its opacity and colour.
-        tf_values: "data", or "fraction" where the points are on fractions of the data's range.
-        low: smallest value of the data.
-        high: largest value of the data.
-        channel: number of the one that these are of.
+    Its values are in these ("data"), or they are fractions of the data's range ("fraction").
     """
-    from texgs.volume.transfer import TransferFunction
-
-    try:
-        tf = TransferFunction(tuple(points.opacity), tuple(points.color), channel)
-        tf = tf.scaled(low, high) if tf_values == "fraction" else tf
-    except ArgumentError as error:
-        raise ArgumentError(f"basic TF {name}: {error}") from error
+    tf = tf.scaled(low, high) if tf_values == "fraction" else tf
     first, last = tf.support
     if first >= high or last <= low:
         raise ArgumentError(
-            f"basic TF {name}: expected a range within the data's [{low:g}, {high:g}], got [{first:g}, "
-            f"{last:g}]; is dataset.tf_values right?"
+            f"expected a range within the data's [{low:g}, {high:g}], got [{first:g}, {last:g}]; is "
+            "dataset.tf_values right?"
         )
     return tf
