@@ -7,9 +7,9 @@ import numpy as np
 
 from tests.fuzz.volumes import Reader, at
 from tests.volume.test_label_names import FREESURFER, SNAP, layered, written
-from texgs.config.dataset_labels import named
+from texgs.config.label_tfs import label_tfs
 from texgs.volume.grid import Grid
-from texgs.volume.label_choice import label_tf, labels_in
+from texgs.volume.label_choice import labels_in
 from texgs.volume.label_masks import MaskSource
 from texgs.volume.label_names import read_table, segments_of
 from texgs.volume.nrrd_file import masks_in
@@ -20,8 +20,7 @@ from texgs.volume.slabs import ArraySource
 
 def functions_of_table(path: Path) -> None:
     """Of each label in the table, as `texgs new --names` makes them."""
-    for each in named(read_table(path)).values():
-        label_tf(each)
+    label_tfs(read_table(path))
 
 
 def masks_of_segments(path: Path) -> None:

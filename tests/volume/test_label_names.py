@@ -147,9 +147,7 @@ def test_a_table_is_given_or_lies_beside_the_file(tmp_path, monkeypatch):
     assert named_in(tmp_path / "aseg.mgz", None)[1] == lut
     assert named_in(tmp_path / "aseg.nii", None)[1] is None
     segments, _ = layered(tmp_path / "a.seg.nrrd")
-    refused(
-        lambda: named_in(segments, snap), "mine.label: expected no table, as a.seg.nrrd names its segments"
-    )
+    refused(lambda: named_in(segments, snap), "mine.label: expected none, as a.seg.nrrd names its segments")
 
 
 def test_files_that_say_that_they_hold_labels(tmp_path):

@@ -1,4 +1,4 @@
-"""Labels of a volume in Python, alone or beside an image: their masks, and the names of their functions."""
+"""Labels of a volume in Python, alone or beside an image: their masks and functions."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from texgs.config.dataset_labels import named
+from texgs.config.label_tfs import label_tfs
 from texgs.core.errors import ArgumentError
 from texgs.core.names import check_count
+from texgs.volume.basic_tfs import BasicTF
 from texgs.volume.grid import MAX_CHANNELS
 from texgs.volume.label_choice import choose, labels_in
 from texgs.volume.label_masks import MaskSource, on_lattice_of
-from texgs.volume.label_names import Label, named_in, read_table
+from texgs.volume.label_names import named_in
 from texgs.volume.slabs import Source
 
 
@@ -25,8 +26,8 @@ def sources_of(
     table: str | Path | None,
     crop: Sequence[int] | None,
     reduce: int,
-) -> tuple[dict[str, Label], list[Source]]:
-    """Return labels by the names of their functions, and an image, if there is one, before their masks.
+) -> tuple[dict[str, BasicTF], list[Source]]:
+    """Return the basic TFs of labels, and an image, if there is one, before their masks.
 
     Args:
         data: a file or an array, of an image or of labels.
@@ -53,12 +54,8 @@ def sources_of(
             return open_file(of, layer)
         return on_lattice_of(open_file(of, layer, name="labels", keys={}), images[0])
 
-    path = None if table is None else Path(table)
-    if isinstance(of, str | Path):
-        known, _ = named_in(Path(of), path)
-    else:
-        known = [] if path is None else read_table(path)
+    known, _ = named_in(*(Path(each) if isinstance(each, str | Path) else None for each in (of, table)))
     words = None if wanted is None else [*map(str, wanted)]
     chosen = choose(labels_in(layer_of, known, crop), words, MAX_CHANNELS - len(images), reduce**3)
     masks = [MaskSource(layer_of(each.layer), each.number, each.name) for each in chosen]
-    return named(chosen), [*images, *masks]
+    return label_tfs(chosen), [*images, *masks]

@@ -30,7 +30,6 @@ from texgs.scene.shot import Shot
 from texgs.volume.basic_tfs import function_of
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
-from texgs.volume.label_choice import label_tf
 from texgs.volume.matter import Matter
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlays
@@ -118,11 +117,10 @@ class Volume:
             warnings.warn(f"{name}: {note.replace('dataset.volume.', '')}", stacklevel=2)
         self.grid = open_grid(self.file)  # samples [Z, Y, X] with spacing and origin, +y up
         prepared = ["" if each.label is None else mask_name(each.label) for each in sources]
-        self.channels = dict(
-            zip(prepared, (self.summary, *others), strict=True)
-        )  # "" is the image, then masks
+        # An image is "", and then come masks.
+        self.channels = dict(zip(prepared, (self.summary, *others), strict=True))
         write_summaries(self.file, [*self.channels.values()], prepared)
-        self._labels = {name: function_of(label_tf(each), prepared) for name, each in shown.items()}
+        self._labels = {name: function_of(tf, prepared) for name, tf in shown.items()}
 
     @classmethod
     def from_pyvista(cls, image: pyvista.ImageData, **options: Any) -> Volume:

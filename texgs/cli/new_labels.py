@@ -75,7 +75,7 @@ def found_in(dataset: Dataset, table: Path | None, channel: str | None) -> list[
 
 def with_chosen(dataset: Dataset, found: list[Label], wanted: list[str] | None, channels: int) -> Dataset:
     """Return a data set with basic TFs of wanted labels, or of the largest; say which are left out."""
-    from texgs.config.dataset_labels import with_labels
+    from texgs.config.label_tfs import label_tfs
     from texgs.volume.label_choice import choose
 
     if not found and wanted:
@@ -89,4 +89,6 @@ def with_chosen(dataset: Dataset, found: list[Label], wanted: list[str] | None, 
             f"{dataset.name}: the {len(chosen)} largest of {len(found)} labels are shown, without "
             f"{', '.join(left[:8])}{', ...' if len(left) > 8 else ''}; labels=[...] chooses others\n"
         )
-    return with_labels(dataset, chosen)
+    numbers = {each.name: each.number for each in chosen if each.is_listed}
+    volume = replace(dataset.volume, label_numbers=numbers)
+    return replace(dataset, volume=volume, basic_tfs=label_tfs(chosen))

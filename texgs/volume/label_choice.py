@@ -1,15 +1,12 @@
-"""Which labels a volume has, which of them are shown, and the functions that show them."""
+"""Which labels a volume has, and which of them are shown."""
 
 from collections.abc import Callable, Sequence
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.basic_tfs import BasicTF
-from texgs.volume.label_masks import HALF, INSIDE, label_counts
-from texgs.volume.label_names import Label, color_of, label_of
+from texgs.volume.label_masks import label_counts
+from texgs.volume.label_names import Label, label_of
 from texgs.volume.prepare import bounds_of
 from texgs.volume.slabs import Source
-
-OPACITY = 0.95  # of a label
 
 
 def labels_in(
@@ -50,9 +47,3 @@ def choose(found: Sequence[Label], wanted: Sequence[str] | None, most: int, leas
             known = ", ".join(each.name for each in found)
             raise ArgumentError(f"labels: no such label {word!r}; expected some of {known}")
     return list(dict.fromkeys(filter(None, chosen.values())))
-
-
-def label_tf(label: Label) -> BasicTF:
-    """Return the basic TF of a label: its mask from one half on, in its colour."""
-    color = [round(each, 3) for each in label.color or color_of(label.number)]
-    return BasicTF([[HALF, OPACITY], [INSIDE, OPACITY]], [[HALF, *color]], label=label.name)

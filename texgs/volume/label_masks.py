@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.grid import Triple, permuted_lattice
+from texgs.volume.grid import permuted_lattice
 from texgs.volume.slabs import Source, slab_bounds
 from texgs.volume.space import LPS, RAS, Space
 from texgs.volume.transfer import TransferFunction
@@ -103,12 +103,9 @@ def on_lattice_of(labels: Source, image: Source) -> Source:
     """Return labels with their axes along those of an image, and require that they lie on its samples."""
     if {labels.space.name, image.space.name} == {LPS, RAS}:
         labels = Flipped(labels, image.space.name)
-    near = 0.01 * min(image.spacing)
-    is_near = [
-        np.allclose(a, b, rtol=0, atol=near)
-        for a, b in zip(corners_of(labels), corners_of(image), strict=True)
-    ]
-    if labels.dims != image.dims or labels.space.name != image.space.name or not all(is_near):
+    is_same = (labels.dims, labels.space.name) == (image.dims, image.space.name)
+    moved = np.abs(corners_of(labels) - corners_of(image))
+    if not is_same or not (moved <= 0.01 * min(image.spacing)).all():
         raise ArgumentError(
             f"{labels.name}: expected labels on the lattice of {image.name}, {words_of(image)}, got "
             f"{words_of(labels)}; resample them to the image first"
@@ -116,20 +113,17 @@ def on_lattice_of(labels: Source, image: Source) -> Source:
     return labels
 
 
-def corners_of(source: Source) -> list[Triple]:
-    """Return the places of the first sample, and of the last ones along x, y and z, in the file's space."""
-    sides = [(size - 1) * step for size, step in zip(source.dims, source.spacing, strict=True)]
-    ends = [[side * (axis == k) for k, side in enumerate(sides)] for axis in range(-1, 3)]
-    return [source.space.place(source.origin, lengths) for lengths in ends]
+def corners_of(source: Source) -> np.ndarray:
+    """Return the places [4, 3] of the first sample, and of the last along x, y and z, in the file's space."""
+    sides = (np.array(source.dims) - 1) * source.spacing
+    return np.array(source.origin) + np.vstack([np.zeros(3), np.diag(sides)]) @ source.space.axes
 
 
 def words_of(source: Source) -> str:
     """Describe a lattice."""
-    dims, spacing, origin = (
-        words.join(f"{x:g}" for x in each)
-        for words, each in ((" x ", source.dims), (", ", source.spacing), (", ", source.origin))
-    )
-    return f"{dims} samples, spacing {spacing}, from {origin} in {source.space.name}"
+    size = " x ".join(map(str, source.dims))
+    spacing, origin = (", ".join(f"{x:g}" for x in each) for each in (source.spacing, source.origin))
+    return f"{size} samples, spacing {spacing}, from {origin} in {source.space.name}"
 
 
 def shows_label(tf: TransferFunction) -> bool:

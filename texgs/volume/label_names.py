@@ -83,17 +83,20 @@ def read_table(path: Path) -> list[Label]:
     return labels
 
 
-def named_in(path: Path, table: Path | None) -> tuple[list[Label], Path | None]:
-    """Return what a header or a table tells of the labels in a file, and a table that was found beside it."""
-    if segments := segments_of(path):
-        if table is not None:
+def named_in(path: Path | None, table: Path | None) -> tuple[list[Label], Path | None]:
+    """Return what a header or a table tells of the labels in a file, and a table that was found beside it.
+
+    The labels of an array have no file.
+    """
+    if path and (segments := segments_of(path)):
+        if table:
             raise ArgumentError(
                 f"{table}: expected no table, as {path.name} names its segments; leave it out"
             )
         return segments, None
-    if table is not None:
+    if table:
         return read_table(table), None
-    for beside in tables_beside(path):
+    for beside in tables_beside(path) if path else ():
         with suppress(ArgumentError):  # another file of that name
             return read_table(beside), beside
     return [], None
@@ -122,17 +125,13 @@ def place_of_label(path: Path, name: str, numbers: Mapping[str, int]) -> tuple[s
     Raises:
         ArgumentError: if neither the file nor `numbers` has that name.
     """
-    if name in numbers:
-        return None, numbers[name]
-    segments = segments_of(path)
-    if found := label_of(name, segments):
+    known = [*(Label(number, word) for word, number in numbers.items()), *segments_of(path)]
+    if found := label_of(name, known):
         return found.layer, found.number
     if name.lstrip("-").isdigit():
         return None, int(name)
-    known = (
-        ", ".join([*numbers, *(each.name for each in segments)]) or "those in dataset.volume.label_numbers"
-    )
-    raise ArgumentError(f"{path.name}: no such label {name!r}; expected its number, or one of {known}")
+    names = ", ".join(each.name for each in known) or "those in dataset.volume.label_numbers"
+    raise ArgumentError(f"{path.name}: no such label {name!r}; expected its number, or one of {names}")
 
 
 def label_of(word: str, labels: Iterable[Label]) -> Label | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -138,14 +139,9 @@ def open_masks(
 
     if made := masks_in(path):
         return [made[name] for name in names]
-    layers: dict[str | None, Source] = {}
-    masks: list[Source] = []
-    for name in names:
-        layer, number = place_of_label(path, name, volume.label_numbers)
-        if layer not in layers:
-            layers[layer] = open_labels(volume, path, layer, image)
-        masks.append(MaskSource(layers[layer], number, name))
-    return masks
+    layer_of = cache(partial(open_labels, volume, path, image=image))
+    places = {name: place_of_label(path, name, volume.label_numbers) for name in names}
+    return [MaskSource(layer_of(layer), number, name) for name, (layer, number) in places.items()]
 
 
 def open_labels(volume: VolumeKeys, path: Path, layer: str | None, image: Source | None = None) -> Source:

@@ -35,7 +35,7 @@ class SlicePlane:
     axis: tuple[int, int]  # across, of the grid, 0 to 2 for x, y, z; 1 where slices count along it, else -1
     right: tuple[int, int]  # the same of columns
     up: tuple[int, int]  # the same of rows, from the lowest one
-    ends: tuple[str, str, str, str]  # what is at the left, right, bottom and top, such as R, L, P, A
+    ends: tuple[str, ...]  # what is at the left, right, bottom and top, such as R, L, P, A
     size: tuple[int, int]  # samples to the right and up
     spacing: tuple[float, float]  # of these, in units of the file
 
@@ -58,19 +58,9 @@ def planes_of(grid: Grid) -> list[SlicePlane]:
     planes = []
     for name, across, (right, turn, up, rise) in zip(names, along, LAYOUT[letters], strict=True):
         (column, one), (row, other) = along[right], along[up]
-        left_right, bottom_top = ends[right][::turn], ends[up][::rise]
-        planes.append(
-            SlicePlane(
-                name,
-                grid.dims[across[0]],
-                across,
-                (column, turn * one),
-                (row, rise * other),
-                (left_right[0], left_right[1], bottom_top[0], bottom_top[1]),
-                (grid.dims[column], grid.dims[row]),
-                (grid.spacing[column], grid.spacing[row]),
-            )
-        )
+        sides = (column, turn * one), (row, rise * other), (*ends[right][::turn], *ends[up][::rise])
+        size, spacing = (grid.dims[column], grid.dims[row]), (grid.spacing[column], grid.spacing[row])
+        planes.append(SlicePlane(name, grid.dims[across[0]], across, *sides, size, spacing))
     return planes
 
 
@@ -89,19 +79,14 @@ def slice_of(grid: Grid, plane: SlicePlane, number: int, channel: int = 0) -> np
 
 def place_at(grid: Grid, point: Sequence[float], channel: int = 0) -> Place | None:
     """Return the sample that is closest to a point of the world, or None beyond the outermost ones."""
-    places = np.array(point) / grid.scale / grid.spacing + 0.5 * (np.array(grid.dims) - 1)
-    stored = np.rint(places).astype(int)
-    if (np.abs(places - 0.5 * (np.array(grid.dims) - 1)) > 0.5 * np.array(grid.dims)).any():
+    dims, steps = np.array(grid.dims), np.array(point) / grid.scale / grid.spacing  # from the middle
+    if (np.abs(steps) > 0.5 * dims).any():
         return None
-    stored = stored.clip(0, np.array(grid.dims) - 1)
-    x, y, z = stored.tolist()
-    lengths = (stored * grid.spacing).tolist()
-    i, j, k = (
-        int(stored[axis] if sign > 0 else grid.dims[axis] - 1 - stored[axis])
-        for axis, sign in closest(grid.space.axes)
-    )
-    value = grid.channel(channel).values[z, y, x]
-    return Place((i, j, k), grid.space.place(grid.origin, lengths), value.item())
+    stored = np.rint(steps + 0.5 * (dims - 1)).astype(int).clip(0, dims - 1)
+    ways = (stored.tolist(), (dims - 1 - stored).tolist())
+    i, j, k = (ways[sign < 0][axis] for axis, sign in closest(grid.space.axes))
+    position = grid.space.place(grid.origin, (stored * grid.spacing).tolist())
+    return Place((i, j, k), position, grid.channel(channel).values[*stored[::-1]].item())
 
 
 def labels_at(grid: Grid, point: Sequence[float], labels: Labels) -> list[str]:
