@@ -30,8 +30,8 @@ def read_volume(config: Config, channels: Mapping[str, Channel | None]) -> dict[
 
     dataset = config.dataset
     if len(channels) > 1:
-        shown = {key: BasicTF(channel=key) for key in channels}
-        dataset = replace(dataset, basic_tfs={**shown, **apart(dataset.basic_tfs, shown)})
+        shown = {f"channel {key}": BasicTF(channel=key) for key in channels}  # as no TF of a label is named
+        dataset = replace(dataset, basic_tfs={**shown, **dataset.basic_tfs})
     check_channels(dataset)
     output = Path(config.results, dataset.name, "volume")
     try:
@@ -58,17 +58,14 @@ def with_tfs(
     if len(channels) > 1:
         listed = of_each(known, channels, arguments)
     elif channels:
-        basic = basic_tfs(dataset.name, known[""], channels[""], arguments.tf, arguments.count)
+        basic = basic_tfs(known[""], channels[""], arguments.tf, arguments.count)
         listed = {key: BasicTF(**tf.to_dict()) for key, tf in basic.items()}
-    dataset = replace(dataset, basic_tfs={**listed, **apart(dataset.basic_tfs, listed)})
+    # Labels have names that others do not have.
+    labels = {f"label_{name}" if name in listed else name: tf for name, tf in dataset.basic_tfs.items()}
+    dataset = replace(dataset, basic_tfs={**listed, **labels})
     check_basic_tfs(dataset)
     ensure(STAGES["transfer"], replace(config, dataset=dataset))
     return dataset
-
-
-def apart(labels: Mapping[str, BasicTF], taken: Mapping[str, BasicTF]) -> dict[str, BasicTF]:
-    """Return TFs of labels by names that others do not have."""
-    return {f"label_{name}" if name in taken else name: tf for name, tf in labels.items()}
 
 
 def of_each(
@@ -87,7 +84,7 @@ def of_each(
     for number, (key, channel) in enumerate(channels.items()):
         has_look = channel and window_function(channel, known[key]["minimum"], known[key]["maximum"])
         count = arguments.count or (None if has_look else 1)
-        basic = basic_tfs(key, known[key], channel, files and files[number : number + 1], count)
+        basic = basic_tfs(known[key], channel, files and files[number : number + 1], count)
         for name, tf in basic.items():
             if len(basic) == 1 and count and not files:
                 tf = tf.with_points(tf.opacity, [(tf.support[0], *COLORS[number % len(COLORS)])])
@@ -105,7 +102,7 @@ def tf_names(labels: list[str]) -> list[str]:
 
 
 def basic_tfs(
-    of: str, summary: Mapping[str, Any], channel: Channel | None, files: list[Path] | None, count: int | None
+    summary: Mapping[str, Any], channel: Channel | None, files: list[Path] | None, count: int | None
 ) -> dict[str, TransferFunction]:
     """Return TFs from files, or suggested for a channel or from the histogram in a summary."""
     from texgs.volume.suggest import suggest

@@ -41,11 +41,6 @@ class SceneVolume:
     tfs: Mapping[str, TransferFunction]  # basic TFs, by the names of models
     appearance: Appearance = field(default_factory=Appearance)
 
-    @property
-    def has_channels(self) -> bool:
-        """Return whether functions use more than the first channel: others, or masks."""
-        return any(tf.source != (0, None) for tf in self.tfs.values())
-
 
 @dataclass(frozen=True)
 class SceneSegment:

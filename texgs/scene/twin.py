@@ -168,10 +168,7 @@ class Twin:
         return last_of(self._matter, state, lambda: Matter(self._caster, tfs, unit, scene.cuts))
 
     def _shown(
-        self,
-        scene: Scene,
-        palettes: Sequence[tuple[float, ...]],
-        functions: Mapping[str, TransferFunction],
+        self, scene: Scene, palettes: Sequence[tuple[float, ...]], functions: Mapping[str, TransferFunction]
     ) -> dict[str, TransferFunction]:
         """Return the functions that a scene shows, with the edits of its models; or others in their place."""
         shown = {}

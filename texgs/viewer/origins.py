@@ -69,7 +69,7 @@ class Origins:
     @cached_property
     def transfer(self) -> dict[str, Any] | None:
         """Return range and histogram of the scene's volume; None where it names none, or shows channels."""
-        if self._volume is None or self._volume.has_channels:
+        if self._volume is None or any(tf.source != (0, None) for tf in self._volume.tfs.values()):
             return None
         ends = [value for tf in self._volume.tfs.values() for value in tf.support]
         range_of_values, counts = histogram_of(summary_file(self._volume.file))

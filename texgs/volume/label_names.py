@@ -90,9 +90,7 @@ def named_in(path: Path | None, table: Path | None) -> tuple[list[Label], Path |
     """
     if path and (segments := segments_of(path)):
         if table:
-            raise ArgumentError(
-                f"{table}: expected no table, as {path.name} names its segments; leave it out"
-            )
+            raise ArgumentError(f"{table}: expected none, as {path.name} names its segments; leave it out")
         return segments, None
     if table:
         return read_table(table), None

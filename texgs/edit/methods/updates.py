@@ -188,29 +188,15 @@ class In2nKeys(UpdateKeys):
         return VoxelLearner(model, loss, rates, self.patches, self.side)
 
 
-METHOD = (
+METHOD = tuple(
     Method(
-        "dge",
-        "edit some views of a scene of 3D Gaussians together by an instruction, as DGE does",
-        DgeKeys,
-        run,
-        fields=frozenset({"gaussians"}),
+        *(name, f"edit {what} by an instruction, as {paper} does", keys, run),
+        fields=frozenset({field}),
         follows="instruction",
-    ),
-    Method(
-        "igs2gs",
-        "edit all views of a scene of 3D Gaussians in turn by an instruction, as Instruct-GS2GS does",
-        Igs2gsKeys,
-        run,
-        fields=frozenset({"gaussians"}),
-        follows="instruction",
-    ),
-    Method(
-        "in2n",
-        "edit views of a scene of voxels one by one by an instruction, as Instruct-NeRF2NeRF does",
-        In2nKeys,
-        run,
-        fields=frozenset({"voxels"}),
-        follows="instruction",
-    ),
+    )
+    for name, what, paper, keys, field in (
+        ("dge", "some views of a scene of 3D Gaussians together", "DGE", DgeKeys, "gaussians"),
+        ("igs2gs", "all views of a scene of 3D Gaussians in turn", "Instruct-GS2GS", Igs2gsKeys, "gaussians"),
+        ("in2n", "views of a scene of voxels one by one", "Instruct-NeRF2NeRF", In2nKeys, "voxels"),
+    )
 )
