@@ -58,7 +58,7 @@ def test_frames_are_those_of_a_scene_that_was_written_so(session, tmp_path):
     session.set("left", "palette", (0.9, 0.1, 0.2))
     session.set("v1.2/right", "opacity", 0.5)
     session.set_light(Light("directional", 30.0, 40.0))
-    session.set_background("#000000")
+    session.set_of_scene("background", "#000000")
     written = Session.open(session.save(tmp_path / "new.yaml"))
     assert written.scene == session.scene
     assert np.array_equal(written.frame(CAMERA), session.frame(CAMERA))
@@ -128,7 +128,7 @@ def test_a_new_segment_looks_as_its_model_does_and_an_earlier_scene_as_it_was(se
         (lambda s: s.set("left/x", "opacity", 1), r"expected a segment of left \(it has none\), got x"),
         (lambda s: s.set("left", "opasity", 1), "models.left: no such key 'opasity', did you mean opacity"),
         (lambda s: s.set("left", "opacity", -1), "models.left.opacity: "),
-        (lambda s: s.set_background("red"), "background: "),
+        (lambda s: s.set_of_scene("background", "red"), "background: "),
         (lambda s: s.set_of_scene("light", "up"), "light: "),
         (lambda s: s.set_of_scene("shadows", "dark"), "light.shadows: expected a number, got 'dark'"),
         (lambda s: s.set_of_scene("reach", 3), "light.reach: expected above 0 to 2"),

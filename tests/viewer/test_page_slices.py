@@ -77,13 +77,10 @@ def test_they_are_those_of_texgs_where_the_page_has_all_samples(opened, tmp_path
     for index in ((20, 21, 23), (3, 30, 11), (24, 19, 26)):
         index = tuple(min(each, plane.count - 1) for each, plane in zip(index, planes, strict=True))
         point = point_of(grid, index)
-        place, got = place_at(grid, point), page.evaluate("point => slices.place(point)", point)
-        inside = [
-            name for name, (channel, _) in labels.items() if place_at(grid, point, channel).value >= 127.5
-        ]
-        assert (tuple(got["index"]), got["labels"]) == (index, inside)
+        place, got = place_at(grid, point, labels), page.evaluate("point => slices.place(point)", point)
+        assert (tuple(got["index"]), tuple(got["labels"])) == (index, place.labels)
         assert np.allclose(got["position"], place.position)
-        assert got["value"] == (None if image is None else place.value)
+        assert (got["value"], place.value is None) == (place.value, image is None)
     assert "on 48 × 40 × 44 samples." in page.evaluate("slices.words")
 
 

@@ -184,7 +184,7 @@ def test_labels_lie_over_slices_in_the_colours_that_they_have_now(tmp_path):
     assert np.array_equal(shown(), grey)
     for index in np.ndindex(SHAPE):
         found = slices.found(Place(tuple(point_of(index[::-1]))))
-        assert found["labels"] == (["high"] if numbers[index] else [])
+        assert found["labels"] == (("high",) if numbers[index] else ())
         assert found["value"] == SAMPLES[index]
 
 

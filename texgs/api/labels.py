@@ -29,14 +29,8 @@ def sources_of(
 ) -> tuple[dict[str, BasicTF], list[Source]]:
     """Return the basic TFs of labels, and an image, if there is one, before their masks.
 
-    Args:
-        data: a file or an array, of an image or of labels.
-        open_file: returns its samples, where labels overlap those of a layer.
-        kind: of the data.
-        labels: of an image a file or an array; of labels the names or numbers of those that are shown.
-        table: names and colours, see `texgs.volume.label_names.read_table`.
-        crop: as for `texgs.Volume`.
-        reduce: the same; a label of fewer samples than a block is only shown where it is wanted.
+    Arguments are as for `texgs.Volume`, and what opens data, where labels overlap a layer of them. A label of
+    fewer samples than a reduced block has is only shown where it is wanted.
     """
     if kind not in ("image", "labels"):
         raise ArgumentError(f"kind: expected image or labels, got {kind!r:.100}")

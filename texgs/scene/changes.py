@@ -169,10 +169,8 @@ def changed_cuts(scene: Scene, key: str, text: str) -> Cuts:
     if key == "box":
         corners = _places(scene, text.split(","), [0, 1, 2] * 2, BOX) if text else []
         return replace(cuts, box=Box(corners[:3], corners[3:]) if text else None)
-    if key == "faces":
-        return cuts_of(plain_cuts(cuts) | {"faces": text or NO_CUTS.faces})
-    if key == "window":
-        return cuts_of(plain_cuts(cuts) | {"window": _plain(text) if text else None})
+    if key in ("faces", "window"):
+        return cuts_of(plain_cuts(cuts) | {key: _plain(text) if text else getattr(NO_CUTS, key)})
     if key and key not in numbers:
         known = ", ".join(f"cut.{each}" for each in ("box", "faces", "window", *numbers))
         raise ArgumentError(f"expected cut, which adds a plane, or one of {known}, got cut.{key}")

@@ -164,11 +164,6 @@ class Session:
         self._push(replace(self.scene, light=light))
 
     @locked
-    def set_background(self, value: object = WHITE) -> None:
-        """Change the background of the scene."""
-        self._push(replace(self.scene, background=color("background", value)))
-
-    @locked
     def set_cuts(self, cuts: Cuts) -> None:
         """Replace the cuts of the scene."""
         self._push(replace(self.scene, cuts=cuts))
@@ -197,7 +192,7 @@ class Session:
             case "time":
                 self.set_scene(self.scene.at(value))
             case _:
-                self.set_background(value)
+                self._push(replace(self.scene, background=color("background", value)))
 
     @locked
     def add_segment(self, part: str, file: Path) -> None:

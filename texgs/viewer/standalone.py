@@ -85,7 +85,8 @@ def scene_page(
     composed = scene.open()
     if not isinstance(composed, Composition):
         raise ArgumentError("expected a scene of surfels, got another kind; fit surfels for this")
-    is_hiding = max(scene.light.shadows, scene.light.occlusion) > 0 and has_matter(scene, composed)
+    has_matter = len(composed) > 0 and any(is_seen(model.edit) for model in scene.models.values())
+    is_hiding = max(scene.light.shadows, scene.light.occlusion) > 0 and has_matter
     if is_hiding:
         require_shadows(scene)
     twin = Twin(scene) if volume is not None or is_hiding else None  # refuses one that is not of the models
@@ -111,11 +112,6 @@ def scene_page(
     picture = poster(scene, composed, view, twin, has_faces=volume is not None)
     html = page_of(description, surfels, picture, checked, volume, moved, light)
     return ScenePage(html, len(composed), picture, moved, light)
-
-
-def has_matter(scene: Scene, composed: Composition) -> bool:
-    """Return whether anything that is seen may hide light."""
-    return len(composed) > 0 and any(is_seen(model.edit) for model in scene.models.values())
 
 
 def page_of(

@@ -17,11 +17,10 @@ SEGMENTATION = ".seg.nrrd"  # of 3D Slicer; its header names segments
 TABLES = (".label", ".ctbl", ".txt")  # suffixes of tables beside a file of labels
 FREESURFER = (".mgz", ".mgh")
 # Of ITK-SNAP: number r g b a visible mesh "name"; of FreeSurfer and 3D Slicer: number name r g b a.
+NUMBER, RGB = r"(?P<number>-?\d+)", r"(?P<r>\d+)\s+(?P<g>\d+)\s+(?P<b>\d+)"
 ROWS = (
-    re.compile(
-        r"(?P<number>-?\d+)\s+(?P<r>\d+)\s+(?P<g>\d+)\s+(?P<b>\d+)\s+[\d.]+\s+\d+\s+\d+\s+\"(?P<name>.*)\""
-    ),
-    re.compile(r"(?P<number>-?\d+)\s+(?P<name>\S.*?)\s+(?P<r>\d+)\s+(?P<g>\d+)\s+(?P<b>\d+)\s+\d+"),
+    re.compile(rf'{NUMBER}\s+{RGB}\s+[\d.]+\s+\d+\s+\d+\s+"(?P<name>.*)"'),
+    re.compile(rf"{NUMBER}\s+(?P<name>\S.*?)\s+{RGB}\s+\d+"),
 )
 MAX_LETTERS = 60  # of a name
 LIGHTNESS, CHROMA = (85, 60, 40), 40  # of colours by number, in CIELAB

@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Sequence
+from itertools import chain, repeat
 from math import hypot
 from pathlib import Path
 from typing import BinaryIO
@@ -55,16 +56,14 @@ def open_prepared(path: Path) -> list[RawSource]:
         space = Space.along(vectors, fields["space"], unit_in(fields))
         x, y, z = map(float, NUMBER.findall(fields["spaceorigin"]))
         stored = np.dtype({word: name for name, word in NRRD_TYPES.items()}[fields["type"]]).newbyteorder("<")
-        lattice, size = ((dx, dy, dz), (x, y, z), space), byte_count((nx, ny, nz), stored)
-        (count,) = n or [1]
+        (count,), masks = n or [1], int(fields.get(f"{MASKS}=", "0"))
         if count < 1:
             raise ArgumentError(f"expected at least one channel, got {count}; {REMEDY}")
+        channels: list[RawSource] = []
         # One by one: a damaged header may tell of any number, and the first that is not there is refused.
-        offsets = (offset + channel * size for channel in range(count))
-        channels = [RawSource(path, (nx, ny, nz), stored, each, *lattice) for each in offsets]
-        behind, byte = offset + count * size, np.dtype(np.uint8)
-        offsets = (behind + k * nx * ny * nz for k in range(int(fields.get(f"{MASKS}=", "0"))))
-        channels += [RawSource(path, (nx, ny, nz), byte, each, *lattice) for each in offsets]
+        for dtype in chain(repeat(stored, count), repeat(np.dtype(np.uint8), masks)):
+            channels.append(RawSource(path, (nx, ny, nz), dtype, offset, (dx, dy, dz), (x, y, z), space))
+            offset += byte_count((nx, ny, nz), dtype)
         labels = json.loads(fields.get(f"{LABELS}=", "[]"))
         for channel, label in zip(channels[::-1], labels[::-1], strict=False):
             channel.label = str(label)

@@ -111,14 +111,11 @@ def _summaries(source: Source, target: Path, tallies: Sequence["_Tally"]) -> lis
 
 def _first_of(sources: Sequence[Source]) -> Source:
     """Return the first of some channels, and require of the others that they are like it; masks are uint8."""
-    first, *others = sources
-    for each in others:
-        is_alike = each.label is not None or each.dtype == first.dtype
-        if not is_alike or (each.dims, each.spacing) != (first.dims, first.spacing):
-            raise ArgumentError(
-                f"{first.name}: expected channels of one lattice and type; choose some of them"
-            )
-    return first
+    lattices = {(each.dims, each.spacing) for each in sources}
+    types = {each.dtype for each in sources if each.label is None}
+    if max(len(lattices), len(types)) > 1:
+        raise ArgumentError(f"{sources[0].name}: expected channels of one lattice and type; choose some")
+    return sources[0]
 
 
 def _kept(dtype: np.dtype) -> np.dtype:

@@ -16,7 +16,6 @@ from texgs.volume.slices import (
     Labels,
     Place,
     SlicePlane,
-    labels_at,
     place_at,
     planes_of,
     point_of,
@@ -96,8 +95,7 @@ def sample_at(grid: Grid, at: Sequence[float] | None = None) -> Place:
     Raises:
         ArgumentError: if it is beyond the volume.
     """
-    point = np.zeros(3) if at is None else np.linalg.solve(grid.world.matrix, [*at, 1])[:3]
-    place = place_at(grid, point.tolist())
+    place = place_at(grid, (0, 0, 0) if at is None else grid.world.in_world(np.array(at)).tolist())
     if place is None:
         low, high = grid.world.points(np.array(grid.aabb)).round(4).tolist()
         raise ArgumentError(f"at: expected a place in the volume, from {low} to {high}, got {at}")
@@ -107,8 +105,8 @@ def sample_at(grid: Grid, at: Sequence[float] | None = None) -> Place:
 def words_at(grid: Grid, point: Sequence[float], labels: Labels) -> str:
     """Return words about the sample at a point of the world: its place, value and labels."""
     letters, words = LETTERS.get(grid.space.name, ("XYZ", ""))[0], list[str]()
-    if place := place_at(grid, point):
+    if place := place_at(grid, point, labels):
         where = ", ".join(f"{letter} {x:.4g}" for letter, x in zip(letters, place.position, strict=True))
-        value = [f"value {place.value:g}"] if all(channel for channel, _ in labels.values()) else []
-        words = [f"{where} {grid.space.unit}".rstrip(), *value]
-    return "; ".join([*words, *labels_at(grid, point, labels)])
+        value = [] if place.value is None else [f"value {place.value:g}"]
+        words = [f"{where} {grid.space.unit}".rstrip(), *value, *place.labels]
+    return "; ".join(words)

@@ -23,6 +23,7 @@ LAYOUT = {
     "xyz": ((1, 1, 2, 1), (0, 1, 2, 1), (0, 1, 1, 1)),
 }
 Labels = Mapping[str, tuple[int, np.ndarray | None]]  # channel of a mask, and its colour [3]; None: hidden
+NO_LABELS: Labels = {}
 COVER = 0.6  # of a label over an image
 
 
@@ -46,7 +47,8 @@ class Place:
 
     index: tuple[int, int, int]  # along the axes of the file's space, from 0, within the prepared volume
     position: Triple  # in the file's space and unit
-    value: float  # of the sample
+    value: float | None  # of the sample; None where there are labels alone
+    labels: tuple[str, ...] = ()  # that the sample is in
 
 
 def planes_of(grid: Grid) -> list[SlicePlane]:
@@ -77,7 +79,7 @@ def slice_of(grid: Grid, plane: SlicePlane, number: int, channel: int = 0) -> np
     return values[::-rise, ::turn, number if sign > 0 else plane.count - 1 - number]
 
 
-def place_at(grid: Grid, point: Sequence[float], channel: int = 0) -> Place | None:
+def place_at(grid: Grid, point: Sequence[float], labels: Labels = NO_LABELS) -> Place | None:
     """Return the sample that is closest to a point of the world, or None beyond the outermost ones."""
     dims, steps = np.array(grid.dims), np.array(point) / grid.scale / grid.spacing  # from the middle
     if (np.abs(steps) > 0.5 * dims).any():
@@ -85,14 +87,14 @@ def place_at(grid: Grid, point: Sequence[float], channel: int = 0) -> Place | No
     stored = np.rint(steps + 0.5 * (dims - 1)).astype(int).clip(0, dims - 1)
     ways = (stored.tolist(), (dims - 1 - stored).tolist())
     i, j, k = (ways[sign < 0][axis] for axis, sign in closest(grid.space.axes))
-    position = grid.space.place(grid.origin, (stored * grid.spacing).tolist())
-    return Place((i, j, k), position, grid.channel(channel).values[*stored[::-1]].item())
+    position, at = grid.space.place(grid.origin, (stored * grid.spacing).tolist()), tuple(stored[::-1])
+    inside = [name for name, (mask, _) in labels.items() if grid.channel(mask).values[at] >= HALF]
+    return Place((i, j, k), position, grid.values[at].item() if has_image(labels) else None, tuple(inside))
 
 
-def labels_at(grid: Grid, point: Sequence[float], labels: Labels) -> list[str]:
-    """Return the names of the labels that the sample at a point of the world is in."""
-    masks = {name: place_at(grid, point, channel) for name, (channel, _) in labels.items()}
-    return [name for name, mask in masks.items() if mask and mask.value >= HALF]
+def has_image(labels: Labels) -> bool:
+    """Return whether the first channel of a volume with labels is no label itself."""
+    return all(channel for channel, _ in labels.values())
 
 
 def point_of(grid: Grid, index: Iterable[int]) -> list[float]:
@@ -124,7 +126,7 @@ def slice_colors(values: Callable[[int], np.ndarray], window: Sequence[float], l
     Values [...] are those that a function tells of a channel. Where the first is a label, there is no grey.
     """
     levels, cover = windowed(values(0), *window), COVER
-    if any(channel == 0 for channel, _ in labels.values()):
+    if not has_image(labels):
         levels, cover = np.zeros_like(levels), 1.0
     colors = np.repeat(levels[..., None], 3, axis=-1)
     for channel, color in labels.values():

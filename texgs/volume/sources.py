@@ -121,9 +121,8 @@ def tells_superior(path: Path) -> bool:
 
 def tells_labels(path: Path) -> bool:
     """Return whether a file itself says that it holds labels: segments of 3D Slicer, or NIfTI's intent."""
-    if _suffix(path) not in NIBABEL_SUFFIXES or not path.is_file():
-        return path.name.lower().endswith(SEGMENTATION)
-    return is_label_image(path)
+    is_named = path.name.lower().endswith(SEGMENTATION)
+    return is_named or (_suffix(path) in NIBABEL_SUFFIXES and is_label_image(path))
 
 
 def _format(path: Path) -> Format | None:

@@ -39,23 +39,16 @@ def source_file(config: Config) -> Path | None:
         return path
     if volume.url:
         return cached_volume(volume)
-    raise MissingDataError(
-        f"data set {dataset.name}: {path} is not there; {volume.obtain or 'put it there'}, "
-        "or name its folder with data_folder=FOLDER or TEXGS_DATA"
-    )
+    raise missing(config, f"{path} is not there; {volume.obtain or 'put it there'}", "its folder")
 
 
 def labels_file(config: Config) -> Path | None:
     """Return the file of labels beside the image of a data set; None where it has none."""
-    dataset = config.dataset
-    if dataset.volume.labels is None:
+    if config.dataset.volume.labels is None:
         return None
-    path = Path(config.data_folder, dataset.volume.labels)
+    path = Path(config.data_folder, config.dataset.volume.labels)
     if not path.is_file():
-        raise MissingDataError(
-            f"data set {dataset.name}: dataset.volume.labels: {path} is not there; put it there, or name its "
-            "folder with data_folder=FOLDER or TEXGS_DATA"
-        )
+        raise missing(config, f"dataset.volume.labels: {path} is not there; put it there", "its folder")
     return path
 
 
@@ -68,10 +61,7 @@ def series_files(config: Config) -> list[Path]:
     try:
         files = matching(Path(config.data_folder, each) for each in config.dataset.series)
     except ArgumentError as error:
-        raise MissingDataError(
-            f"data set {name}: dataset.series: {error}; put them there, or name the folder above with "
-            "data_folder=FOLDER or TEXGS_DATA"
-        ) from error
+        raise missing(config, f"dataset.series: {error}; put them there") from error
     if len(files) < 2:
         return files
     if own not in files:
@@ -93,15 +83,14 @@ def views_folder(config: Config, tf: str | None = None) -> Path | None:
     folder = Path(config.data_folder, config.dataset.views_folder, tf or config.tf or "")
     if not (folder / "transforms_train.json").is_file():
         how = config.dataset.volume.obtain or "put them there, with a file transforms_train.json"
-        raise no_views(config, f"no views in {folder}; {how}")
+        raise missing(config, f"no views in {folder}; {how}")
     return folder
 
 
-def no_views(config: Config, why: str) -> MissingDataError:
-    """Return the error for views that are not there."""
+def missing(config: Config, why: str, folder: str = "the folder above") -> MissingDataError:
+    """Return the error for data that are not there."""
     return MissingDataError(
-        f"data set {config.dataset.name}: {why}, "
-        "or name the folder above with data_folder=FOLDER or TEXGS_DATA"
+        f"data set {config.dataset.name}: {why}, or name {folder} with data_folder=FOLDER or TEXGS_DATA"
     )
 
 
@@ -133,7 +122,7 @@ def tf_names(config: Config) -> list[str]:
             check_name(f"folder of views in {folder}", name)
         if not names:
             how = config.dataset.volume.obtain or "put one there per basic TF"
-            raise no_views(config, f"no folder of views in {folder}; {how}")
+            raise missing(config, f"no folder of views in {folder}; {how}")
     if not names:
         raise ConfigError(f"data set {config.dataset.name}: expected at least one basic TF, got none")
     return names

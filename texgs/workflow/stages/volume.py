@@ -46,8 +46,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     if volume.kind == "image":
         fields = [open_field(channel, inputs.get("source")) for channel in channels]
     if settings.labels:
-        file = inputs["source" if volume.kind == "labels" else "labels"]
-        fields += open_masks(volume, file, settings.labels, fields[0] if fields else None)
+        fields += open_masks(volume, inputs.get("labels") or inputs["source"], settings.labels, *fields[:1])
     shown = partial(progress, title=f"{settings.dataset}: volume", unit="slab")
     summaries = prepare_fields(volume, fields, target, shown)
     if fields[0].note:
