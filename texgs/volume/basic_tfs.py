@@ -66,11 +66,10 @@ def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) ->
     for name, each in points.items():
         wanted = each.values_of or ""
         mask = None if each.within is None else mask_name(each.within)
-        for channel in filter(None, (wanted if len(known) > 1 else None, mask)):
-            if channel not in known:
-                raise ArgumentError(
-                    f"basic TF {name}: expected a channel of {volume} ({', '.join(known)}), got {channel}"
-                )
+        for channel in (wanted if len(known) > 1 else None, mask):
+            if channel is not None and channel not in known:
+                expected = f"expected a channel of {volume} ({', '.join(known)})"
+                raise ArgumentError(f"basic TF {name}: {expected}, got {channel or None}")
         number = [*known].index(wanted) if wanted in known else 0
         summary = [*known.values()][number]
         tf = in_data_values(name, each, tf_values, summary["minimum"], summary["maximum"], number)
