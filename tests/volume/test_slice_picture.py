@@ -9,7 +9,8 @@ from tests.refusals import refused
 from tests.scene.labelled import BLUE, RED, hill, labelled_scene, labels
 from texgs.scene.session import Session
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.slice_picture import CROSS, SliceKeys, sample_at, words_at
+from texgs.volume.slice_keys import SliceKeys
+from texgs.volume.slice_picture import CROSS, sample_at, words_at
 from texgs.volume.slices import point_of, window_of, windowed
 
 LINE = tuple(bytes.fromhex(CROSS[1:]))

@@ -37,7 +37,8 @@ from texgs.volume.overlay import overlays
 from texgs.volume.prepare import prepare_channels
 from texgs.volume.render import Appearance
 from texgs.volume.slabs import Source
-from texgs.volume.slice_picture import SliceKeys, sample_at, slice_picture
+from texgs.volume.slice_keys import SliceKeys
+from texgs.volume.slice_picture import sample_at, slice_picture
 from texgs.volume.slices import Place
 from texgs.volume.sources import open_source, tells_superior
 from texgs.volume.suggest import suggest

@@ -20,7 +20,6 @@ from texgs.config.project import FORBIDDEN_LETTERS, check_name, name_of
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import is_there, write_bytes
 from texgs.core.memory import room_for_volume
-from texgs.volume.grid import MAX_CHANNELS
 from texgs.volume.settings import VolumeKeys
 
 if TYPE_CHECKING:
@@ -164,6 +163,7 @@ def array_of(volume: VolumeKeys) -> Source | None:
 
 def with_room(config: Config, field: Source, channels: int, labels: int) -> Config:
     """Return a configuration whose channels and masks take at most half of the free memory; say how."""
+    from texgs.volume.grid import MAX_CHANNELS
     from texgs.volume.prepare import bounds_of
 
     dataset, volume = config.dataset, config.dataset.volume

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.grid import MAX_CHANNELS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -76,6 +75,7 @@ def found_in(dataset: Dataset, table: Path | None, channel: str | None) -> list[
 def with_chosen(dataset: Dataset, found: list[Label], wanted: list[str] | None, channels: int) -> Dataset:
     """Return a data set with basic TFs of wanted labels, or of the largest; say which are left out."""
     from texgs.config.dataset_labels import with_labels
+    from texgs.volume.grid import MAX_CHANNELS
     from texgs.volume.label_choice import choose
 
     if not found and wanted:
