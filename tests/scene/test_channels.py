@@ -102,8 +102,9 @@ def test_a_channel_that_the_volume_lacks_is_told(scene):
     refused(lambda: shown(broken), "channel: expected one of 0 to 1, got 2")
 
 
-def test_a_page_carries_the_channels_that_functions_use_and_edits_the_first_alone(scene):
-    for names, numbers in ((("C0",), [0]), (("C1",), [0, 1]), (("C0", "C1"), [0, 1])):  # slices show the first
+def test_a_page_carries_the_channels_that_functions_use_and_has_an_editor_of_the_first_alone(scene):
+    # Slices show the first.
+    for names, numbers in ((("C0",), [0]), (("C1",), [0, 1]), (("C0", "C1"), [0, 1])):
         tfs = {name: scene.volume.tfs[name] for name in names}
         shown = replace(scene, volume=replace(scene.volume, tfs=tfs))
         carried = page_volume(shown, 1.0)

@@ -41,7 +41,7 @@ def test_faces_of_cuts_show_slices_where_there_is_a_volume(chromium, scene_file,
         expect(faces).to_have_value("slice")
         assert still(page) == rendered(volume, page)
         faces.select_option("Shaded")
-        faces.select_option("Slice")
+        faces.select_option("Slices")
         expect(page.get_by_role("listitem").last).to_have_text("cuts 1 plane, slice")
         save_as(page, "again.yaml")
         assert read_scene(tmp_path / "again.yaml").cuts == cuts

@@ -7,7 +7,7 @@ import numpy as np
 
 from texgs.scene.scene import Scene
 from texgs.scene.twin import edit_function, is_seen
-from texgs.volume.label_masks import HALF, INSIDE
+from texgs.volume.label_masks import shows_label
 
 Color = tuple[float, ...]
 SAMPLES = 9  # colours of a function over its range
@@ -40,9 +40,8 @@ def legend_of(scene: Scene, palettes: Sequence[Color]) -> list[Entry]:
                 entries += [Entry(part, [shown])] if (shown := edit.palette or palette) else []
                 continue
             low, high = tf.support
-            is_label = (tf.opacity[0][0], tf.opacity[-1][0]) == (HALF, INSIDE)
             samples = edit_function(tf, edit, palette)(np.linspace(low, high, SAMPLES))
             colors = [tuple(rgb) for rgb in samples[:, :3].round(4).tolist()]
-            words = "" if is_label else f"{low:.4g} to {high:.4g}"
+            words = "" if shows_label(tf) else f"{low:.4g} to {high:.4g}"
             entries.append(Entry(part, colors if len({*colors}) > 1 else [edit.palette or colors[0]], words))
     return entries

@@ -14,9 +14,9 @@ from texgs.scene.scene import volume_of
 from texgs.scene.session import Session
 from texgs.viewer.messages import Place, Slice, parse
 from texgs.volume.grid import Grid
-from texgs.volume.label_masks import HALF, shows_label
+from texgs.volume.label_masks import shows_label
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.slices import Labels, place_at, planes_of, slice_colors, slice_of, window_of
+from texgs.volume.slices import Labels, labels_at, place_at, planes_of, slice_colors, slice_of, window_of
 
 
 class Slices:
@@ -54,11 +54,9 @@ class Slices:
     def found(self, asked: Place) -> dict[str, Any] | None:
         """Return index, position and value of the sample at a place, and the labels there."""
         grid, labels = self._open()
-        masks = {name: place_at(grid, asked.point, channel) for name, (channel, _) in labels.items()}
-        inside = [name for name, mask in masks.items() if mask and mask.value >= HALF]
         place, is_mask = place_at(grid, asked.point), any(channel == 0 for channel, _ in labels.values())
         none = {"value": None} if is_mask else {}  # of an image
-        return {**asdict(place), **none, "labels": inside} if place else None
+        return {**asdict(place), **none, "labels": labels_at(grid, asked.point, labels)} if place else None
 
     def _open(self) -> tuple[Grid, Labels]:
         """Map the volume of the scene as it is now, and return its labels in their colours."""

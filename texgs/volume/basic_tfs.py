@@ -66,12 +66,11 @@ def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) ->
     for name, each in points.items():
         wanted = each.values_of or "" if len(known) > 1 else next(iter(known))
         mask = None if each.within is None else mask_name(each.within)
-        if missing := {wanted, mask or wanted} - known.keys():
-            raise ArgumentError(
-                f"basic TF {name}: expected a channel of {volume} ({', '.join(known)}), got "
-                f"{missing.pop() or None}"
-            )
-        number = [*known].index(wanted)
+        for channel in (wanted if len(known) > 1 else None, mask):
+            if channel is not None and channel not in known:
+                expected = f"expected a channel of {volume} ({', '.join(known)})"
+                raise ArgumentError(f"basic TF {name}: {expected}, got {channel or None}")
+        number = [*known].index(wanted) if wanted in known else 0
         summary = [*known.values()][number]
         tf = in_data_values(name, each, tf_values, summary["minimum"], summary["maximum"], number)
         functions[name] = tf if mask is None else replace(tf, within=[*known].index(mask))

@@ -10,12 +10,12 @@ from PIL import Image, ImageDraw, ImageFont
 from texgs.core.errors import ArgumentError
 from texgs.core.image import with_caption
 from texgs.volume.grid import Grid
-from texgs.volume.label_masks import HALF
 from texgs.volume.slice_keys import SliceKeys
 from texgs.volume.slices import (
     Labels,
     Place,
     SlicePlane,
+    labels_at,
     place_at,
     planes_of,
     point_of,
@@ -95,5 +95,4 @@ def words_at(grid: Grid, point: Sequence[float], labels: Labels) -> str:
         where = ", ".join(f"{letter} {x:.4g}" for letter, x in zip(letters, place.position, strict=True))
         value = [f"value {place.value:g}"] if all(channel for channel, _ in labels.values()) else []
         words = [f"{where} {grid.space.unit}".rstrip(), *value]
-    masks = {name: place_at(grid, point, channel) for name, (channel, _) in labels.items()}
-    return "; ".join([*words, *(name for name, mask in masks.items() if mask and mask.value >= HALF)])
+    return "; ".join([*words, *labels_at(grid, point, labels)])

@@ -104,6 +104,12 @@ def place_at(grid: Grid, point: Sequence[float], channel: int = 0) -> Place | No
     return Place((i, j, k), grid.space.place(grid.origin, lengths), value.item())
 
 
+def labels_at(grid: Grid, point: Sequence[float], labels: Labels) -> list[str]:
+    """Return the names of the labels that the sample at a point of the world is in."""
+    masks = {name: place_at(grid, point, channel) for name, (channel, _) in labels.items()}
+    return [name for name, mask in masks.items() if mask and mask.value >= HALF]
+
+
 def point_of(grid: Grid, index: Iterable[int]) -> list[float]:
     """Return the point [3] of the world of a sample, by its index along the axes of the file's space."""
     point = [0.0, 0.0, 0.0]

@@ -3,7 +3,6 @@
 import { timesOf } from "./state.js";
 
 const MOST = 1e6; // of a coordinate
-const MOST_VALUE = 3e38; // of a sample: they have 32 bits
 const MOST_FACTOR = 1000, MOST_PLANES = 6, MOST_REACH = 2, MOST_MARKERS = 100, MOST_LETTERS = 200;
 
 /** A number between two others; nothing else. */
@@ -12,8 +11,7 @@ const areThree = (x, low, high) => Array.isArray(x) && x.length === 3 && x.every
 const isColor = (x) => areThree(x, 0, 1);
 const isFactor = (x) => isNumber(x, 0, MOST_FACTOR);
 const isPlane = (x) => areThree(x?.normal) && Math.hypot(...x.normal) >= 1 / MOST && isNumber(x.offset);
-const isWindow = (x) => Array.isArray(x) && x.length === 2
-  && x.every((end) => isNumber(end, -MOST_VALUE, MOST_VALUE));
+const isWindow = (x) => Array.isArray(x) && x.length === 2 && x.every(Number.isFinite);
 const isBox = (x) => areThree(x?.low) && areThree(x?.high) && x.low.every((low, i) => low < x.high[i]);
 const arePoints = (x, columns, least) => Array.isArray(x) && x.length >= least && x.every((row, i) =>
   Array.isArray(row) && row.length === columns && Number.isFinite(row[0]) && !(row[0] < x[i - 1]?.[0])

@@ -12,8 +12,6 @@ import { remoteSlices } from "./remote_slices.js";
 import { ScenePage } from "./scene_page.js";
 import { SegmentTool } from "./segment.js";
 import { SharedState } from "./shared.js";
-import { Slices } from "./slices.js";
-import { SlicesInScene } from "./slices_in_scene.js";
 import { difference } from "./state.js";
 import { TimeSlider } from "./time.js";
 import { Toolbar } from "./toolbar.js";
@@ -52,7 +50,7 @@ class Page extends ScenePage {
     const hasFunctions = scene.transfer && Object.keys(scene.tfs).length > 0;
     get("transfer-section").hidden = !hasFunctions;
     if (hasFunctions) new TransferEditor(get("transfer"), this, scene.transfer, choices.presets);
-    if (scene.slices) this.#addSlices(scene);
+    if (scene.slices) this.addSlices(remoteSlices(scene.slices));
     get("look-start").onclick = () => this.beginLook();
     get("look-start").disabled = !scene.models.some((model) => model.can.includes("look"));
     this.follow();
@@ -62,13 +60,6 @@ class Page extends ScenePage {
     super.draw(moving);
     this.compare?.show();
     this.looks?.paint();
-  }
-
-  #addSlices({ slices, space }) {
-    const made = new Slices(remoteSlices(slices), space ?? { axes: "xyz", unit: "" },
-      (text) => this.notices.tell(text, "error"));
-    made.addEventListener("click", () => this.measure.click(made.point));
-    this.addMark(new SlicesInScene(this, made, () => this.segments.isLocked || this.measure.isOn));
   }
 
   #segment(model) {

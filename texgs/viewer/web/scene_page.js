@@ -15,6 +15,8 @@ import { editsOf } from "./link.js";
 import { MarkerShapes } from "./marker_shapes.js";
 import { Measure } from "./measure.js";
 import { ScaleBar } from "./scale_bar.js";
+import { Slices } from "./slices.js";
+import { SlicesInScene } from "./slices_in_scene.js";
 import { difference, edited } from "./state.js";
 
 const REST = 100; // milliseconds after the last movement until a whole frame is drawn
@@ -85,9 +87,12 @@ export class ScenePage {
     window.addEventListener("hashchange", () => this.follow());
   }
 
-  /** Draw something else that lies over the picture. */
-  addMark(mark) {
-    this.#marks.push(mark);
+  /** Offer slices of the scene's volume, from a source that `Slices` describes. */
+  addSlices(source) {
+    const space = this.state.scene.space ?? { axes: "xyz", unit: "" };
+    const slices = new Slices(source, space, (text) => this.notices.tell(text, "error"));
+    slices.addEventListener("click", () => this.measure.click(slices.point));
+    this.#marks.push(new SlicesInScene(this, slices, this.#isLocked));
   }
 
   /** What of the scene is shown: `mode`, whether as it was `before`, `only` which model, or all; `gain` and

@@ -10,8 +10,6 @@ import { drawMarks } from "./picture_marks.js";
 import { ScenePage } from "./scene_page.js";
 import { PictureDialog } from "./size_inputs.js";
 import { inFile } from "./space.js";
-import { Slices } from "./slices.js";
-import { SlicesInScene } from "./slices_in_scene.js";
 import { State, difference } from "./state.js";
 import { TimeSlider } from "./time.js";
 import { TransferEditor } from "./transfer.js";
@@ -30,7 +28,9 @@ class StandalonePage extends ScenePage {
     if (scene.held) this.time = new TimeSlider(this.state, get("time"), () => renderer.isBusy);
     if (scene.volume) {
       this.compare = new Compare(this);
-      this.#addSlices(scene);
+      const source = new PageSlices(renderer.samples, this.state);
+      this.addSlices(source);
+      get("slices").append(element("p", { className: "hint" }, source.words));
       if (scene.transfer && Object.keys(scene.tfs).length) new TransferEditor(get("transfer"), this, scene.transfer, scene.presets);
     }
     this.state.addEventListener("change", () => {
@@ -38,14 +38,6 @@ class StandalonePage extends ScenePage {
       if (scene.volume) this.#limitModes();
     });
     this.follow();
-  }
-
-  #addSlices({ space }) {
-    const source = new PageSlices(this.renderer.samples, this.state);
-    const slices = new Slices(source, space ?? { axes: "xyz", unit: "" }, (text) => this.notices.tell(text, "error"));
-    get("slices").append(element("p", { className: "hint" }, source.words));
-    slices.addEventListener("click", () => this.measure.click(slices.point));
-    this.addMark(new SlicesInScene(this, slices, () => this.measure.isOn));
   }
 
   draw(moving) {

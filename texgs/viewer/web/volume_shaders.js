@@ -7,8 +7,9 @@ import { MOST_PLANES } from "./shaders.js";
 export const PER_TEXTURE = 4; // channels
 
 /**
- * The shader of sources, see function_table.js: where several are at one place, their extinctions add up. They are
- * written out one by one, as arrays are slow on some cards.
+ * The shader of sources, see function_table.js: where several are at one place, their extinctions add up. What each
+ * step needs of them is written out, as arrays are slow on some cards; what only shown ones need is not, as drivers
+ * take long for long shaders.
  *
  * @param {object[]} sources
  * @param {object[]} channels of the page, some in each texture of samples.
@@ -22,7 +23,8 @@ export function volumeFragment(sources, channels) {
   const code = (name, channel) => `${name}${texture(channel)}${isAlone ? "" : `.${place(channel)}`}`;
   const codesOf = (name) => `${isAlone ? "float" : "vec4"} ${Array.from({ length: textures }, (_, t) => `${name}${t}`)}`;
   const codes = (channel) => ["before", "behind"].map((side) => code(side, channel)).join(", ");
-  const used = [...new Set(sources.map(({ channel }) => channel))];
+  const shade = (look, channel) => `vec3 normal = of_face < 1.0 ? normal_at(${channel}, middle, texel) : vec3(0.0);
+        color += ${look}.a / all * shown(${look}.rgb, normal, of_face, face, point);`;
   return `#version 300 es
 precision highp float;
 precision highp int;
@@ -32,6 +34,8 @@ precision highp usampler3D;
 
 const float LEAST_LIGHT = 1e-3;  // below which a ray ends
 const float FLAT = 1e-6;         // a slope without direction
+const int SOURCES = ${sources.length};
+const int CHANNELS[SOURCES] = int[SOURCES](${sources.map(({ channel }) => channel).join(", ")});
 
 ${each((t) => `uniform sampler3D samples${t};`)} // codes of channels
 uniform usampler3D bricks;       // distances, with one more brick on each side
@@ -76,18 +80,24 @@ vec3 lit(vec3 color, vec3 normal, vec3 point) {
   return clamp(color * (share.y * material.x + share.x * material.y * n_l) + highlight * tint, 0.0, 1.0);
 }
 
-// The normals of channels at a place of their texture, 0 where nothing changes.
-${used.map((channel) => `vec3 normal${channel}(vec3 place, vec3 texel) {
+// The code of a channel at a place of the textures.
+float code_at(int channel, vec3 at) {
+  ${isAlone ? `return ${read(0)};` : `vec4 codes;
+  ${each((t) => `if (channel / ${PER_TEXTURE} == ${t}) codes = ${read(t)};`)}
+  return codes[channel % ${PER_TEXTURE}];`}
+}
+
+// The normal of a channel at a place of the textures, 0 where nothing changes.
+vec3 normal_at(int channel, vec3 place, vec3 texel) {
   vec3 slope, per_length = (1.0 / texel - 1.0) / box;
   for (int a = 0; a < 3; a++) {
     vec3 step = vec3(0.0);
     step[a] = texel[a];
-    float ahead = texture(samples${texture(channel)}, place + step).${place(channel)};
-    slope[a] = (ahead - texture(samples${texture(channel)}, place - step).${place(channel)}) * per_length[a] / most(per_length);
+    slope[a] = (code_at(channel, place + step) - code_at(channel, place - step)) * per_length[a] / most(per_length);
   }
   return dot(slope, slope) > FLAT * FLAT ? normalize(slope) : vec3(0.0);
 }
-`).join("")}
+
 // The part of a step from one code of a mask to another that is in it.
 float part_in(float one, float two, float half_code) {
   return clamp((max(one, two) - half_code) / max(abs(two - one), 1e-6), 0.0, 1.0);
@@ -175,10 +185,11 @@ void main() {
       float part = min(k + 1.0, ends) - max(k, begins), alpha = 1.0 - exp2(-all * part * interval / unit);
       float of_face = face < 0 ? 0.0 : clamp((face_end - near) / interval - k, 0.0, 1.0);
       vec3 middle = (place + 0.5) * texel, point = box * (2.0 * place / last - 1.0), color = vec3(0.0);
-      ${ofEach(({ channel }, s) => `if (look${s}.a > 0.0) {
-        vec3 normal = of_face < 1.0 ? normal${channel}(middle, texel) : vec3(0.0);
-        color += look${s}.a / all * shown(look${s}.rgb, normal, of_face, face, point);
-      }`)}
+      ${sources.length === 1 ? shade("look0", sources[0].channel)
+    : `vec4 looks[SOURCES] = vec4[SOURCES](${sources.map((_, s) => `look${s}`).join(", ")});
+      for (int s = 0; s < SOURCES; s++) if (looks[s].a > 0.0) {
+        ${shade("looks[s]", "CHANNELS[s]")}
+      }`}
       if (is_depth) {
         color = vec3((near + (k + 0.5) * interval) / length(camera));
         if (clear > 0.5 && clear * (1.0 - alpha) <= 0.5) halfway = color.x;
