@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -43,15 +44,24 @@ def as_labels(config: Config) -> Config:
     return replace(config, dataset=replace(dataset, volume=replace(dataset.volume, kind="labels")))
 
 
-def are_labels(summary: Mapping[str, Any]) -> bool:
-    """Return whether samples of a volume are whole numbers that are taken for labels."""
+def look_like_labels(summary: Mapping[str, Any]) -> bool:
+    """Return whether samples of a volume have as few values as labels have."""
     import numpy as np
 
     from texgs.volume.suggest import looks_like_labels
 
-    is_whole = np.dtype(summary["dtype"]).kind in "iu" and not summary.get("robust")
     extent = summary["maximum"] - summary["minimum"]
-    return is_whole and looks_like_labels(np.array(summary["histogram"]), extent)
+    return not summary.get("robust") and looks_like_labels(np.array(summary["histogram"]), extent)
+
+
+def are_whole(volume: Path) -> bool:
+    """Return whether samples of a prepared volume are whole numbers, of any type."""
+    from texgs.volume.label_masks import label_counts
+    from texgs.volume.nrrd_file import open_prepared
+
+    with suppress(ArgumentError):
+        return bool(label_counts(open_prepared(volume)[0]))
+    return False
 
 
 def found_in(dataset: Dataset, table: Path | None, channel: str | None) -> list[Label]:
