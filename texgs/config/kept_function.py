@@ -30,11 +30,17 @@ def keep(scene: Scene, name: str) -> str:
     check_name("function", name)
     file = file_of(volume.file)
     dataset, text = recompose((f"dataset={file.stem}",)).dataset, file.read_bytes().decode()
-    ends = [(each["minimum"], each["maximum"]) for each in read_summaries(volume.file).values()]
+    summaries = read_summaries(volume.file)
+    ends = [(each["minimum"], each["maximum"]) for each in summaries.values()]
     low, high = ends[known[name].channel]
     with errors_at(short_path(file)):
         if name in dataset.basic_tfs:
             raise ArgumentError(f"basic_tfs: {name} is there already; copy the function, or edit the file")
+        if len(summaries) > 1 and [*summaries] != dataset.prepared:
+            raise ArgumentError(
+                f"basic_tfs: expected those of the scene's volume, of {', '.join(summaries)}, got others, of "
+                f"{', '.join(dataset.prepared)}; make the scene again by texgs run dataset={dataset.name}"
+            )
         tf = known[name].rounded(low, high)
         if is_scaled := dataset.tf_values == "fraction":
             tf = known[name].with_values(lambda value: (value - low) / (high - low)).rounded(0, 1)
