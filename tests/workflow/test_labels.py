@@ -80,6 +80,12 @@ def test_functions_overlap_within_a_mask_only():
     refused(lambda: check_basic_tfs(again), "basic TFs .*inside.*twice")
     for points in tfs.values():
         assert basic_tf_of(function_of(points, dataset.prepared), dataset.prepared) == points
+    shown = function_of(tfs["inside"], dataset.prepared)
+    for wrong, told in (
+        ({"channel": 3}, r"channel: .*\[0, 1, 2\], got 3"),
+        ({"within": 0}, r"within: .*\[1, 2\]"),
+    ):
+        refused(lambda keys=wrong: basic_tf_of(replace(shown, **keys), dataset.prepared), told)
 
 
 def prepared(folder, dataset, **inputs):
