@@ -121,6 +121,7 @@ def test_mistakes_are_one_sentence(scene):
         (SliceKeys(at=(0, 0, 0)), r"at: expected a place in the volume, from \[-10.0, 5.0, 40.0\] to"),
     ):
         refused(lambda keys=keys: session.slices(keys), words)
+    refused(lambda: SliceKeys(window=(200, 0)), r"window: expected black below white, got \[200, 0\]")
     bare = Session(replace(scene, volume=None))
     refused(lambda: bare.slices(SliceKeys()), "volume: expected the volume that the scene was made from")
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from texgs.core.keys import key
+from texgs.core.names import check_window
 from texgs.volume.view_settings import LARGEST
 
 
@@ -19,3 +20,6 @@ class SliceKeys:
         None, "values in black and in white; default what 99 % are between"
     )
     width: int = key(800, "of the picture", "pixels", least=16, most=LARGEST)
+
+    def __post_init__(self) -> None:
+        check_window(self.window)

@@ -88,12 +88,11 @@ def slice_of(grid: Grid, plane: SlicePlane, number: int, channel: int = 0) -> np
 
 
 def place_at(grid: Grid, point: Sequence[float], channel: int = 0) -> Place | None:
-    """Return the sample that is closest to a point of the world, or None beyond the outermost ones."""
+    """Return the sample closest to a point of the world, or None over half a sample beyond the outermost."""
     places = np.array(point) / grid.scale / grid.spacing + 0.5 * (np.array(grid.dims) - 1)
-    stored = np.rint(places).astype(int)
-    if (np.abs(places - 0.5 * (np.array(grid.dims) - 1)) > 0.5 * np.array(grid.dims)).any():
+    if not (np.abs(places - 0.5 * (np.array(grid.dims) - 1)) <= 0.5 * np.array(grid.dims)).all():
         return None
-    stored = stored.clip(0, np.array(grid.dims) - 1)
+    stored = np.rint(places).astype(int).clip(0, np.array(grid.dims) - 1)
     x, y, z = stored.tolist()
     lengths = (stored * grid.spacing).tolist()
     i, j, k = (
