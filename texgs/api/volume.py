@@ -31,6 +31,7 @@ from texgs.volume.basic_tfs import function_of
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
 from texgs.volume.label_choice import label_tf
+from texgs.volume.label_masks import INSIDE
 from texgs.volume.matter import Matter
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlays
@@ -197,11 +198,15 @@ class Volume:
 
     @takes(SliceKeys, "plane", "number")
     def slice(self, keys: SliceKeys) -> Image:
-        """Return a picture of a slice, or of all three, with a crosshair."""
-        return picture_of(slice_picture(self.grid, keys, {}))
+        """Return a picture of a slice, or of all three, with labels and a crosshair."""
+        labels = {name: (tf.channel, tf(INSIDE)[:3]) for name, tf in self._labels.items()}
+        return picture_of(slice_picture(self.grid, keys, labels))
 
     def place(self, x: float, y: float, z: float) -> Place:
-        """Return the sample closest to a place in the space of the file: its index, position and value."""
+        """Return the sample closest to a place in the space of the file: its index, position and value.
+
+        Of labels alone, the value is that of the first one's mask, 0 to 255.
+        """
         return sample_at(self.grid, (x, y, z))
 
     def to_pyvista(self) -> pyvista.ImageData:
