@@ -136,6 +136,10 @@ def test_labels_beside_an_image_are_behind_it(files, tmp_path):
     assert [each.dtype for each in grid.others] == [np.uint8] * 2
     made = basic_tfs_of(file, tfs, "data")
     assert [(tf.channel, tf.within) for tf in made.values()] == [(0, 1), (2, None)]
+    shares = BasicTF([[0.0, 0.5], [0.5, 0.5]], [[0.0, 1, 1, 1]], within="3")
+    made = basic_tfs_of(file, {"bone": shares, "five": tfs["five"]}, "fraction")
+    high = float(np.load(files[0]).max())
+    assert [tf.support for tf in made.values()] == [(0, high / 2), (127.5, 255)]
     assert read_json(tmp_path / "volume.json")["channels"]["label 3"]["dtype"] == "uint8"
 
 

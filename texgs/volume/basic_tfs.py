@@ -80,7 +80,8 @@ def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) ->
                 raise ArgumentError(f"basic TF {name}: {expected}, got {channel or None}")
         number = [*known].index(wanted) if wanted in known else 0
         summary = [*known.values()][number]
-        tf = in_data_values(name, each, tf_values, summary["minimum"], summary["maximum"], number)
+        values = tf_values if each.label is None else "data"  # of masks: 0 to 255
+        tf = in_data_values(name, each, values, summary["minimum"], summary["maximum"], number)
         functions[name] = tf if mask is None else replace(tf, within=[*known].index(mask))
     return functions
 
