@@ -62,6 +62,16 @@ def test_labels_beside_an_image_join_its_functions(labels, tmp_path):
     assert list(texgs.Volume(scan).channels) == [""]
 
 
+def test_slices_show_labels_in_their_colours(labels):
+    z, y, x = np.argwhere(labels == 5).mean(axis=0)
+    volume = texgs.Volume(labels, kind="labels")
+    pixels = np.asarray(volume.slice("all", at=(x, y, z)))
+    own = np.rint(255 * np.array(volume.suggest()["label_5"].color[0][1:]))
+    assert 0.01 < (pixels == own).all(axis=-1).mean() < 0.5
+    place = volume.place(x, y, z)
+    assert (place.value, place.labels) == (None, ("label_5",))
+
+
 @pytest.mark.parametrize("recipe", ["quick", "now"])
 def test_a_fit_has_a_model_of_each_label(labels, tmp_path, recipe):
     volume = texgs.Volume(labels, kind="labels", labels=[5, 2], name="organs")

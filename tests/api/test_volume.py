@@ -27,7 +27,8 @@ from texgs.volume.framing import frame_of
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlay
 from texgs.volume.render import Appearance
-from texgs.volume.slice_picture import SliceKeys, slice_picture
+from texgs.volume.slice_keys import SliceKeys
+from texgs.volume.slice_picture import slice_picture
 
 RED = texgs.TransferFunction([[0.5, 0.0], [1.0, 0.5]], [[0.5, 1.0, 0.0, 0.0]])
 BLUE = texgs.TransferFunction([[0.0, 0.0], [0.2, 0.1], [0.4, 0.0]], [[0.0, 0.0, 0.0, 1.0]])

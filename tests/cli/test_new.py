@@ -331,7 +331,7 @@ def test_tfs_of_a_narrow_range_far_from_zero_keep_their_digits(conf, tmp_path):
     values = np.full((8, 8, 8), 1e8, np.float32)
     values[2:6, 2:6, 2:6] += 8
     np.save(tmp_path / "far.npy", values)
-    assert main(["new", "far.npy", "--name", "far"]) == 0
+    assert main(["new", "far.npy", "--name", "far", "kind=image"]) == 0
     (tf,) = compose(("dataset=far",)).dataset.basic_tfs.values()
     first, last = tf.opacity[0][0], tf.opacity[-1][0]
     assert 1e8 < first < 1e8 + 8 <= last < 1e8 + 9

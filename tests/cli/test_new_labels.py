@@ -44,6 +44,22 @@ def written(name):
     return yaml.safe_load(Path(f"conf/dataset/{name}.yaml").read_text(encoding="utf-8"))
 
 
+@pytest.mark.parametrize("dtype", ["int32", "float32", "float64"])
+def test_labels_of_any_type_are_recognised(conf, labels, capsys, dtype):
+    """FreeSurfer writes 32 bits, and much software floating point."""
+    assert main(["new", nifti(conf.parent / "seg.nii.gz", labels.astype(dtype))]) == 0
+    assert f"seg: {TAKEN}" in capsys.readouterr().err
+    assert recompose(("dataset=seg",)).dataset.labels == ["1", "2", "3"]
+
+
+@pytest.mark.parametrize(("dtype", "words"), [("uint8", ["--count", "2"]), ("float32", [])])
+def test_shells_of_few_values_are_told(conf, labels, capsys, dtype, words):
+    values = (labels * (0.5 if dtype == "float32" else 1)).astype(dtype)
+    assert main(["new", nifti(conf.parent / "seg.nii.gz", values), *words]) == 0
+    assert "as thin shells; kind=labels" in capsys.readouterr().err
+    assert "kind" not in written("seg")["volume"]
+
+
 def test_whole_numbers_of_few_values_are_labels(conf, labels, capsys):
     file = nifti(conf.parent / "seg.nii.gz", labels)
     assert main(["new", file]) == 0
@@ -74,12 +90,7 @@ def test_they_are_values_where_that_is_said(conf, labels, capsys, words):
     assert (dataset.volume.kind, dataset.labels) == ("image", [])
 
 
-def test_floats_are_labels_where_that_is_said(conf, labels, capsys):
-    file = nifti(conf.parent / "seg.nii.gz", labels.astype(np.float32))
-    assert main(["new", file]) == 0
-    assert not compose(("dataset=seg",)).dataset.labels
-    assert main(["new", file, "kind=labels", "--force"]) == 0
-    assert recompose(("dataset=seg",)).dataset.labels == ["1", "2", "3"]
+def test_samples_that_are_no_whole_numbers_are_no_labels(conf, labels, capsys):
     assert main(["new", nifti(conf.parent / "ct.nii.gz", labels + 0.5), "kind=labels"]) == 2
     assert "ct.nii.gz: expected labels, which are whole numbers, got 0.5; is it" in capsys.readouterr().err
 

@@ -29,7 +29,7 @@ from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import write_segment
 from texgs.scene.session import Session
-from texgs.volume.slice_picture import SliceKeys
+from texgs.volume.slice_keys import SliceKeys
 
 
 @pytest.fixture

@@ -126,6 +126,21 @@ print('torch' in sys.modules)
     assert done.stdout.split() == ["False"]
 
 
+@pytest.mark.parametrize("verb", ["render", "new", "edit"])
+def test_mistyped_options_are_told_at_once(verb):
+    """Importing torch alone would take 2 s."""
+    code = f"""
+import sys
+from texgs.cli.main import main
+try:
+    main(['{verb}', '--no-such-option'])
+finally:
+    print(*({{'torch', 'numpy', 'cv2', 'PIL'}} & {{*sys.modules}}))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stdout.split()) == (2, [])
+
+
 WORDS = [  # files and keys together
     (),
     ("experiment=demo", "fit=quick"),

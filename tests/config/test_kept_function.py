@@ -79,6 +79,17 @@ def test_a_function_of_a_channel_names_it(here, is_scaled):
     np.testing.assert_allclose(made.opacity, scene.functions["TF03"].opacity, rtol=1e-5)
 
 
+def test_a_scene_of_other_channels_than_its_data_set_has_now_is_refused(here):
+    """Functions name channels by number: those of labels would be of another one without a word."""
+    scene = channels_of(here, is_scaled=False)
+    document = yaml.safe_load(file_of(here).read_text())
+    del document["basic_tfs"]["TF01"]
+    file_of(here).write_text(as_yaml(document))
+    refused(
+        lambda: keep(scene, "TF03"), "expected those of the scene's volume, of DAPI, GFP, got others, of GFP;"
+    )
+
+
 def file_of(folder):
     return folder / "conf" / "dataset" / "mine.yaml"
 

@@ -44,6 +44,8 @@ def test_what_is_no_cut_is_refused():
     refused(lambda: Box([0.0] * 3, [1.0, 0.0, 1.0]), "box: ")
     refused(lambda: Box([0.0] * 2, [1.0] * 2), "box: ")
     refused(lambda: Cuts([Plane([1.0, 0.0, 0.0])] * 7), "planes: .*7")
+    for window in ((5.0, 1.0), (1.0, 1.0)):
+        refused(lambda ends=window: Cuts(window=ends), "window: expected black below white, got ")
 
 
 def test_a_box_beside_six_planes_makes_twelve_half_spaces():

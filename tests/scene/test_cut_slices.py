@@ -78,6 +78,17 @@ def test_faces_show_the_samples_that_rays_meet_and_hide_what_is_behind(scene):
     assert (alpha[is_face] == 255).mean() > 0.985
 
 
+def test_the_outermost_slices_are_whole(scene):
+    """Places on them are beyond the volume by the rounding of single precision, or are not."""
+    half = open_grid(scene.volume.file).aabb[1][1]
+    camera, shares = orbit(0, 85, 3, 30, 90, 70), []
+    for offset in (-half, -0.999 * half):
+        cut = replace(scene, cuts=Cuts([Plane([0.0, 1.0, 0.0], offset)], faces="slice"))
+        shares.append((Session(cut).frame(camera, transparent=True)[..., 3] == 255).mean())
+    assert shares[0] == pytest.approx(shares[1], rel=0.02)
+    assert shares[1] > 0.1
+
+
 def test_away_from_faces_the_view_is_as_ever(scene):
     _, is_face = expected_faces(scene)
     unlit = replace(scene, cuts=replace(SLICES, faces="unlit"))

@@ -69,3 +69,6 @@ def test_a_function_of_an_image_is_no_label(scene):
     tfs = {"liver": LOW, "bone": RAMP}
     entries = legend_of(replace(scene, volume=replace(scene.volume, tfs=tfs)), PALETTES)
     assert entries[0].range == f"{LOW.support[0]:.4g} to {LOW.support[1]:.4g}"
+    bright = replace(RAMP, opacity=((127.5, 0.0), (140.0, 0.6), (255.0, 0.6)))  # of 8 bits
+    entries = legend_of(replace(scene, volume=replace(scene.volume, tfs={**tfs, "bone": bright})), PALETTES)
+    assert entries[1].range == "127.5 to 255"

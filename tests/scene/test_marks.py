@@ -108,6 +108,12 @@ def test_lengths_are_those_of_the_files_space():
     assert length_of(marker, None) == f"{np.linalg.norm(B):.3g} world units"
     assert length_of(marker, Space()) == f"{np.linalg.norm(B):.3g} volume units"
     assert length_of(Marker(((0.0, 0.0, 0.0), (100.0, 0.0, 0.0))), MM) == "20000 mm"
+    assert (
+        length_of(
+            Marker(((0.0, 0.0, 0.0), (0.99975, 0.0, 0.0))), Space(matrix=np.diag([1e3, 1e3, 1e3, 1]).tolist())
+        )
+        == "1000 volume units"
+    )
     assert length_of(Marker((A,)), MM) == ""
 
 

@@ -128,6 +128,9 @@ def test_masks_behind_an_image_keep_their_type_and_can_be_taken_from_the_file(tm
     assert list(masks_in(file)) == ["liver", "2"]
     again = open_masks(VolumeKeys(labels=str(file)), file, ["2", "liver"], open_source(file))
     assert_array_equal(again[1].slices(0, 5), grid.others[0])
+    refused(
+        lambda: open_masks(VolumeKeys(), file, ["5"]), "volume.nrrd: no such label '5'; expected .*liver, 2"
+    )
     prepare_channels([open_source(file), *again[::-1]], tmp_path / "again.nrrd")
     assert (tmp_path / "again.nrrd").read_bytes() == file.read_bytes()
     assert not masks_in(tmp_path / "seg.nii.gz")

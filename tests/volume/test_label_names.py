@@ -135,7 +135,7 @@ def test_names_are_text_that_settings_hold_and_never_numbers():
 
 def test_a_table_is_given_or_lies_beside_the_file(tmp_path, monkeypatch):
     path = tmp_path / "seg.v2.nii.gz"
-    assert named_in(path, None) == ([], None)
+    assert named_in(path, None) == named_in(type(path)(), None) == ([], None)
     written(tmp_path / "seg.v2.txt", "These are my labels.\n")
     assert named_in(path, None) == ([], None), "that is another file"
     table = written(tmp_path / "seg.v2.ctbl", FREESURFER)

@@ -9,7 +9,8 @@ from tests.refusals import refused
 from tests.scene.labelled import BLUE, RED, hill, labelled_scene, labels
 from texgs.scene.session import Session
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.slice_picture import CROSS, SliceKeys, sample_at, words_at
+from texgs.volume.slice_keys import SliceKeys
+from texgs.volume.slice_picture import CROSS, sample_at, words_at
 from texgs.volume.slices import point_of, window_of, windowed
 
 LINE = tuple(bytes.fromhex(CROSS[1:]))
@@ -120,6 +121,7 @@ def test_mistakes_are_one_sentence(scene):
         (SliceKeys(at=(0, 0, 0)), r"at: expected a place in the volume, from \[-10.0, 5.0, 40.0\] to"),
     ):
         refused(lambda keys=keys: session.slices(keys), words)
+    refused(lambda: SliceKeys(window=(200, 0)), r"window: expected black below white, got \[200, 0\]")
     bare = Session(replace(scene, volume=None))
     refused(lambda: bare.slices(SliceKeys()), "volume: expected the volume that the scene was made from")
 

@@ -151,6 +151,7 @@ def test_there_is_nothing_beyond_the_outermost_samples():
     corner = np.array(grid.aabb[1]) * 9 / 8  # half a sample beyond the last one
     assert place_at(grid, corner * 0.999).index == (8, 8, 8)
     assert place_at(grid, corner * (1.001, 1, 1)) is None
+    assert place_at(grid, [0, np.nan, 0]) is None
     plane = planes_of(grid)[0]
     for number in (-1, 9):
         refused(lambda at=number: slice_of(grid, plane, at), f"slice: expected x from 0 to 8, got {number}")

@@ -1,4 +1,5 @@
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -115,6 +116,12 @@ class TestDictionary:
 def test_wrong_points_are_named(opacity, color, message):
     with pytest.raises(ArgumentError, match=message):
         TransferFunction(opacity, color)
+
+
+@pytest.mark.parametrize("within", ["", "1", False, 0.0, [], -1])
+def test_a_mask_is_a_number(within):
+    with pytest.raises(ArgumentError, match="within: expected a number from 0 on, got "):
+        replace(TENT, within=within)
 
 
 def test_overlap_names_both_functions_and_ranges():

@@ -80,6 +80,12 @@ def test_functions_overlap_within_a_mask_only():
     refused(lambda: check_basic_tfs(again), "basic TFs .*inside.*twice")
     for points in tfs.values():
         assert basic_tf_of(function_of(points, dataset.prepared), dataset.prepared) == points
+    shown = function_of(tfs["inside"], dataset.prepared)
+    for wrong, told in (
+        ({"channel": 3}, r"channel: .*\[0, 1, 2\], got 3"),
+        ({"within": 0}, r"within: .*\[1, 2\]"),
+    ):
+        refused(lambda keys=wrong: basic_tf_of(replace(shown, **keys), dataset.prepared), told)
 
 
 def prepared(folder, dataset, **inputs):
@@ -130,6 +136,10 @@ def test_labels_beside_an_image_are_behind_it(files, tmp_path):
     assert [each.dtype for each in grid.others] == [np.uint8] * 2
     made = basic_tfs_of(file, tfs, "data")
     assert [(tf.channel, tf.within) for tf in made.values()] == [(0, 1), (2, None)]
+    shares = BasicTF([[0.0, 0.5], [0.5, 0.5]], [[0.0, 1, 1, 1]], within="3")
+    made = basic_tfs_of(file, {"bone": shares, "five": tfs["five"]}, "fraction")
+    high = float(np.load(files[0]).max())
+    assert [tf.support for tf in made.values()] == [(0, high / 2), (127.5, 255)]
     assert read_json(tmp_path / "volume.json")["channels"]["label 3"]["dtype"] == "uint8"
 
 

@@ -19,7 +19,7 @@ from texgs.scene.export_keys import Export
 from texgs.scene.film import Film
 from texgs.scene.session import Session
 from texgs.scene.shot import Shot
-from texgs.volume.slice_picture import SliceKeys
+from texgs.volume.slice_keys import SliceKeys
 
 if TYPE_CHECKING:
     import pyvista

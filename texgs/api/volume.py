@@ -30,13 +30,15 @@ from texgs.scene.shot import Shot
 from texgs.volume.basic_tfs import function_of
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
+from texgs.volume.label_masks import INSIDE
 from texgs.volume.matter import Matter
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlays
 from texgs.volume.prepare import prepare_channels
 from texgs.volume.render import Appearance
 from texgs.volume.slabs import Source
-from texgs.volume.slice_picture import SliceKeys, sample_at, slice_picture
+from texgs.volume.slice_keys import SliceKeys
+from texgs.volume.slice_picture import sample_at, slice_picture
 from texgs.volume.slices import Place
 from texgs.volume.sources import open_source, tells_superior
 from texgs.volume.suggest import suggest
@@ -121,6 +123,7 @@ class Volume:
         self.channels = dict(zip(prepared, (self.summary, *others), strict=True))
         write_summaries(self.file, [*self.channels.values()], prepared)
         self._labels = {name: function_of(tf, prepared) for name, tf in shown.items()}
+        self._colors = {name: (tf.channel, tf(INSIDE)[:3]) for name, tf in self._labels.items()}
 
     @classmethod
     def from_pyvista(cls, image: pyvista.ImageData, **options: Any) -> Volume:
@@ -194,12 +197,12 @@ class Volume:
 
     @takes(SliceKeys, "plane", "number")
     def slice(self, keys: SliceKeys) -> Image:
-        """Return a picture of a slice, or of all three, with a crosshair."""
-        return picture_of(slice_picture(self.grid, keys, {}))
+        """Return a picture of a slice, or of all three, with labels and a crosshair."""
+        return picture_of(slice_picture(self.grid, keys, self._colors))
 
     def place(self, x: float, y: float, z: float) -> Place:
-        """Return the sample closest to a place in the space of the file: its index, position and value."""
-        return sample_at(self.grid, (x, y, z))
+        """Return the sample closest to a place in the space of the file: its index, value and labels."""
+        return sample_at(self.grid, (x, y, z), self._colors)
 
     def to_pyvista(self) -> pyvista.ImageData:
         """Return image data of PyVista in the space of the volume's file; the samples are not copied."""

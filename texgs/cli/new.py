@@ -11,7 +11,15 @@ from pathlib import Path
 from shutil import rmtree
 from typing import TYPE_CHECKING
 
-from texgs.cli.new_labels import KIND_KEYS, are_labels, as_labels, found_in, with_chosen, without_lists
+from texgs.cli.new_labels import (
+    KIND_KEYS,
+    are_whole,
+    as_labels,
+    found_in,
+    look_like_labels,
+    with_chosen,
+    without_lists,
+)
 from texgs.cli.new_tfs import read_volume, with_tfs
 from texgs.cli.options import require_only_files
 from texgs.config.compose import compose
@@ -20,7 +28,6 @@ from texgs.config.project import FORBIDDEN_LETTERS, check_name, name_of
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import is_there, write_bytes
 from texgs.core.memory import room_for_volume
-from texgs.volume.grid import MAX_CHANNELS
 from texgs.volume.settings import VolumeKeys
 
 if TYPE_CHECKING:
@@ -124,10 +131,15 @@ def data_set(config: Config, files: list[Path], keys: list[str], arguments: argp
         config = with_room(config, field, len(channels), len(arguments.labels or found))
     config = replace(config, dataset=with_chosen(config.dataset, found, arguments.labels, len(channels)))
     known = read_volume(config, channels)
-    is_said = not KIND_KEYS.isdisjoint(keys) or files or arguments.tf or arguments.count
-    if not is_said and len(channels) == 1 and are_labels(known[""]):
-        rmtree(Path(config.results, config.dataset.name, "volume"))  # of the same samples as values
-        return data_set(as_labels(config), files, keys, arguments)
+    if len(channels) == 1 and KIND_KEYS.isdisjoint(keys) and look_like_labels(known[""]):
+        output = Path(config.results, config.dataset.name, "volume")
+        if not (files or arguments.tf or arguments.count) and are_whole(output / "volume.nrrd"):
+            rmtree(output)  # of the same samples as values
+            return data_set(as_labels(config), files, keys, arguments)
+        sys.stderr.write(
+            f"{config.dataset.name}: values are as few as those of labels, but read as an image: between two "
+            "of them rays see those in between, as thin shells; kind=labels shows labels\n"
+        )
     return with_tfs(config, known, channels, arguments)
 
 
@@ -164,6 +176,7 @@ def array_of(volume: VolumeKeys) -> Source | None:
 
 def with_room(config: Config, field: Source, channels: int, labels: int) -> Config:
     """Return a configuration whose channels and masks take at most half of the free memory; say how."""
+    from texgs.volume.grid import MAX_CHANNELS
     from texgs.volume.prepare import bounds_of
 
     dataset, volume = config.dataset, config.dataset.volume

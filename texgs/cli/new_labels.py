@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -11,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.grid import MAX_CHANNELS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -44,15 +44,24 @@ def as_labels(config: Config) -> Config:
     return replace(config, dataset=replace(dataset, volume=replace(dataset.volume, kind="labels")))
 
 
-def are_labels(summary: Mapping[str, Any]) -> bool:
-    """Return whether samples of a volume are whole numbers that are taken for labels."""
+def look_like_labels(summary: Mapping[str, Any]) -> bool:
+    """Return whether samples of a volume have as few values as labels have."""
     import numpy as np
 
     from texgs.volume.suggest import looks_like_labels
 
-    is_whole = np.dtype(summary["dtype"]).kind in "iu" and not summary.get("robust")
     extent = summary["maximum"] - summary["minimum"]
-    return is_whole and looks_like_labels(np.array(summary["histogram"]), extent)
+    return not summary.get("robust") and looks_like_labels(np.array(summary["histogram"]), extent)
+
+
+def are_whole(volume: Path) -> bool:
+    """Return whether samples of a prepared volume are whole numbers, of any type."""
+    from texgs.volume.label_masks import label_counts
+    from texgs.volume.nrrd_file import open_prepared
+
+    with suppress(ArgumentError):
+        return bool(label_counts(open_prepared(volume)[0]))
+    return False
 
 
 def found_in(dataset: Dataset, table: Path | None, channel: str | None) -> list[Label]:
@@ -76,6 +85,7 @@ def found_in(dataset: Dataset, table: Path | None, channel: str | None) -> list[
 def with_chosen(dataset: Dataset, found: list[Label], wanted: list[str] | None, channels: int) -> Dataset:
     """Return a data set with basic TFs of wanted labels, or of the largest; say which are left out."""
     from texgs.config.label_tfs import label_tfs
+    from texgs.volume.grid import MAX_CHANNELS
     from texgs.volume.label_choice import choose
 
     if not found and wanted:

@@ -6,7 +6,7 @@ from pathlib import Path
 from texgs.cli.options import add_device, add_keys, keys_of, option, require_own_place
 from texgs.core.errors import ArgumentError, errors_at
 from texgs.scene.film import Film
-from texgs.volume.slice_picture import SliceKeys
+from texgs.volume.slice_keys import SliceKeys
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

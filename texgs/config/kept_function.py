@@ -9,7 +9,7 @@ from texgs.config.dataset_text import require_read, with_basic_tf
 from texgs.config.project import ROOT, check_name, own_folder, short_path
 from texgs.core.errors import ArgumentError, ConfigError, errors_at
 from texgs.core.io import read_json, write_bytes
-from texgs.core.names import METRICS
+from texgs.core.names import METRICS, mask_name
 from texgs.scene.scene import Scene
 from texgs.volume.basic_tfs import basic_tf_of, function_of
 from texgs.volume.framing import frame_of, out_of_frame
@@ -30,17 +30,25 @@ def keep(scene: Scene, name: str) -> str:
     check_name("function", name)
     file = file_of(volume.file)
     dataset, text = recompose((f"dataset={file.stem}",)).dataset, file.read_bytes().decode()
-    ends = [(each["minimum"], each["maximum"]) for each in read_summaries(volume.file).values()]
+    summaries = read_summaries(volume.file)
+    ends = [(each["minimum"], each["maximum"]) for each in summaries.values()]
     low, high = ends[known[name].channel]
     with errors_at(short_path(file)):
         if name in dataset.basic_tfs:
             raise ArgumentError(f"basic_tfs: {name} is there already; copy the function, or edit the file")
+        if len(summaries) > 1 and [*summaries] != dataset.prepared:
+            raise ArgumentError(
+                f"basic_tfs: expected those of the scene's volume, of {', '.join(summaries)}, got others, of "
+                f"{', '.join(dataset.prepared)}; make the scene again by texgs run dataset={dataset.name}"
+            )
         tf = known[name].rounded(low, high)
-        if is_scaled := dataset.tf_values == "fraction":
+        is_fraction = dataset.tf_values == "fraction"
+        is_scaled = [is_fraction and not each.startswith(mask_name("")) for each in summaries]
+        if is_scaled[known[name].channel]:
             tf = known[name].with_values(lambda value: (value - low) / (high - low)).rounded(0, 1)
         basic_tfs = {**dataset.basic_tfs, name: basic_tf_of(tf, dataset.prepared)}
         tfs = {key: function_of(points, dataset.prepared) for key, points in basic_tfs.items()}
-        tfs = {key: tf.scaled(*ends[tf.channel]) for key, tf in tfs.items()} if is_scaled else tfs
+        tfs = {key: tf.scaled(*ends[tf.channel]) if is_scaled[tf.channel] else tf for key, tf in tfs.items()}
         with errors_at("basic_tfs"):
             check_disjoint(tfs)
         framing, grid = dataset.framing, open_grid(volume.file)

@@ -6,6 +6,7 @@ from math import hypot
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import REQUIRED, key
+from texgs.core.names import check_window
 
 AXES = "xyz"
 FACES = ("shaded", "unlit", "slice")
@@ -72,6 +73,7 @@ class Cuts:
     def __post_init__(self) -> None:
         if len(self.planes) > MAX_PLANES:
             raise ArgumentError(f"planes: expected at most {MAX_PLANES}, got {len(self.planes)}")
+        check_window(self.window)
 
     def __bool__(self) -> bool:
         """Return whether there is any cut."""

@@ -119,6 +119,12 @@ def natural_order(path: Path, *, has_decimals: bool = False) -> list[tuple[str, 
     return [(text, Fraction(digits or -1)) for text, digits in re.findall(rf"(\D*)({number})", str(path))]
 
 
+def check_window(window: tuple[float, float] | None) -> None:
+    """Require that the value in black, if there is one, is below that in white."""
+    if window is not None and not window[0] < window[1]:
+        raise ArgumentError(f"window: expected black below white, got {list(window)}")
+
+
 def is_number(value: object) -> bool:
     """Return whether a value is a finite number; true and false are none."""
     if isinstance(value, bool) or not isinstance(value, int | float):

@@ -14,6 +14,7 @@ from texgs.volume.lookup import Lookup
 from texgs.volume.slices import Labels, slice_colors
 from texgs.volume.transfer import TransferFunction
 
+ROUNDING = 1e-5  # world units of places: the outermost slices are in the volume
 ANY = TransferFunction(((0, 1), (1, 1)), ((0, 0, 0, 0),))  # only its channel is looked up
 
 
@@ -23,7 +24,8 @@ def with_slices(
     """Return a view with slices on the faces of a cut, opaque where a face is in the volume."""
     near, far = cut.depth_range
     places = camera.unproject(near)
-    solid = (cut.face >= 0) & (near < far) & (places.abs() <= places.new_tensor(caster.half)).all(dim=-1)
+    beyond = (places.abs() - places.new_tensor(caster.half)).amax(dim=-1)
+    solid = (cut.face >= 0) & (near < far) & (beyond <= ROUNDING)
 
     def values(channel: int) -> np.ndarray:
         found = Lookup(caster, replace(ANY, channel=channel)).at(places[solid], ("values",))

@@ -28,7 +28,7 @@ def length_of(marker: Marker, space: Space | None) -> str:
         return ""
     length = dist(*marker.points) * (space.scale if space else 1.0)
     unit = (space.unit or "volume units") if space else "world units"
-    return f"{f'{length:.3g}' if length < 1000 else f'{length:.0f}'} {unit}"
+    return f"{f'{length:.3g}' if length < 999.5 else f'{length:.0f}'} {unit}"
 
 
 def with_marks(picture: np.ndarray, camera: Camera, scene: Scene, legend: Sequence[Entry] = ()) -> np.ndarray:

@@ -43,7 +43,8 @@ from texgs.scene.scene_file import (
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.scene.shot import Mode, Shot
 from texgs.scene.twin import Twin, last_of, needs_twin
-from texgs.volume.slice_picture import SliceKeys, slice_picture
+from texgs.volume.slice_keys import SliceKeys
+from texgs.volume.slice_picture import slice_picture
 
 T = TypeVar("T")
 P = ParamSpec("P")

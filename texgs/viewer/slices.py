@@ -59,7 +59,8 @@ class Slices:
 
     def _open(self) -> tuple[Grid, Labels]:
         """Map the volume of the scene as it is now, and return its labels in their colours."""
-        scene, palettes = self._session.scene, self._session.composition.palettes
+        scene = self._session.scene  # which another thread may change
+        palettes = self._session.composition_of(scene).palettes
         has_labels = any(map(shows_label, volume_of(scene).tfs.values()))
         labels = self._session.twin_of(scene).labels(scene, palettes) if has_labels else {}
         return open_grid(volume_of(scene).file), labels

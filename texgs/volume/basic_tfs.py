@@ -39,10 +39,18 @@ class BasicTF:
 
 
 def basic_tf_of(tf: TransferFunction, prepared: Sequence[str]) -> BasicTF:
-    """Return the basic TF of a function of prepared channels, by the names of these."""
+    """Return the basic TF of a function of prepared channels, by the names of these.
+
+    Raises:
+        ArgumentError: if there is no such channel, or `within` is not that of a mask.
+    """
     labels = [
         name.partition(mask_name(""))[2] if name.startswith(mask_name("")) else None for name in prepared
     ]
+    for name, number in (("channel", tf.channel), ("within", tf.within)):
+        known = [k for k, each in enumerate(labels) if name == "channel" or each is not None]
+        if number not in (None, *known):
+            raise ArgumentError(f"{name}: expected one of {known}, got {number}")
     channel = None if labels[tf.channel] else prepared[tf.channel] or None
     within = None if tf.within is None else labels[tf.within]
     points = tf.to_dict()
@@ -74,7 +82,8 @@ def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) ->
         with errors_at(f"basic TF {name}"):
             tf = function_of(each, [*known])
             summary = [*known.values()][tf.channel]
-            functions[name] = in_data_values(tf, tf_values, summary["minimum"], summary["maximum"])
+            values = tf_values if each.label is None else "data"  # of masks: 0 to 255
+            functions[name] = in_data_values(tf, values, summary["minimum"], summary["maximum"])
     return functions
 
 

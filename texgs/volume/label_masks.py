@@ -127,5 +127,9 @@ def words_of(source: Source) -> str:
 
 
 def shows_label(tf: TransferFunction) -> bool:
-    """Return whether a function shows the mask of a label: all values from one half on."""
-    return (tf.opacity[0][0], tf.opacity[-1][0]) == (HALF, INSIDE)
+    """Return whether a function shows the mask of a label: all values from one half on, where it steps up.
+
+    Those of an image of 8 bits may have the same ends, but begin transparent where there are darker samples.
+    """
+    (first, step), (last, _) = tf.opacity[0], tf.opacity[-1]
+    return (first, last) == (HALF, INSIDE) and step > 0

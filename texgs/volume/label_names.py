@@ -102,7 +102,7 @@ def named_in(path: Path | None, table: Path | None) -> tuple[list[Label], Path |
 def tables_beside(path: Path) -> list[Path]:
     """Return files beside a file of labels that may be its table, by its name; of FreeSurfer also its own."""
     stem = path.name.removesuffix(".gz").rpartition(".")[0]
-    tables = [path.with_name(stem + suffix) for suffix in TABLES]
+    tables = [path.parent / (stem + suffix) for suffix in TABLES]
     if path.suffix.lower() in FREESURFER and (home := os.environ.get("FREESURFER_HOME")):
         tables.append(Path(home, "FreeSurferColorLUT.txt"))
     return [table for table in tables if table != path and table.is_file()]

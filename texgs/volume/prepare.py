@@ -173,7 +173,8 @@ class _Tally:
             )
         if self.is_mask and self.maximum < HALF:
             raise ArgumentError(
-                f"{self.name}: expected some samples, got none in the crop, or too few for reduce"
+                f"{self.name}: expected some samples, got none in the crop, or too few for "
+                "reduce; leave the label out, or reduce less"
             )
         if self.minimum == self.maximum and self.varies:
             raise ArgumentError(

@@ -138,6 +138,8 @@ def open_masks(
     from texgs.volume.nrrd_file import masks_in
 
     if made := masks_in(path):
+        if missing := [name for name in names if name not in made]:
+            raise ArgumentError(f"{path}: no such label {missing[0]!r}; expected one of {', '.join(made)}")
         return [made[name] for name in names]
     layer_of = cache(partial(open_labels, volume, path, image=image))
     places = {name: place_of_label(path, name, volume.label_numbers) for name in names}

@@ -1,7 +1,6 @@
 """A picture of slices through a place of a volume, with a crosshair, and words about the place."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import cv2
@@ -10,9 +9,10 @@ from PIL import Image, ImageDraw, ImageFont
 
 from texgs.core.errors import ArgumentError
 from texgs.core.image import with_caption
-from texgs.core.keys import key
 from texgs.volume.grid import Grid
+from texgs.volume.slice_keys import SliceKeys
 from texgs.volume.slices import (
+    NO_LABELS,
     Labels,
     Place,
     SlicePlane,
@@ -24,25 +24,10 @@ from texgs.volume.slices import (
     window_of,
 )
 from texgs.volume.space import LETTERS
+from texgs.volume.view_settings import LARGEST
 
 CROSS, LETTER, LETTER_SIZE = "#f2b134", "#8ab8ff", 16  # colours, and pixels
 GAP = 6  # pixels between pictures, and around letters
-LARGEST = 16384  # pixels of a side
-
-
-@dataclass(frozen=True)
-class SliceKeys:
-    """Which slices of a volume, and how."""
-
-    plane: str = key("all", "axial, coronal, sagittal, or x, y, z in no patient's space; all: side by side")
-    number: int | None = key(None, "of the slice, from 0; default through the place", least=0, option="slice")
-    at: tuple[float, float, float] | None = key(
-        None, "place that slices go through, in space and unit of the volume's file; default the middle"
-    )
-    window: tuple[float, float] | None = key(
-        None, "values in black and in white; default what 99 % are between"
-    )
-    width: int = key(800, "of the picture", "pixels", least=16, most=LARGEST)
 
 
 def slice_picture(grid: Grid, keys: SliceKeys, labels: Labels) -> np.ndarray:
@@ -89,13 +74,13 @@ def marked(pixels: np.ndarray, plane: SlicePlane, size: tuple[int, int], at: Seq
     return picture
 
 
-def sample_at(grid: Grid, at: Sequence[float] | None = None) -> Place:
+def sample_at(grid: Grid, at: Sequence[float] | None = None, labels: Labels = NO_LABELS) -> Place:
     """Return the sample closest to a place [3] in the space of the file; by default the middle one.
 
     Raises:
         ArgumentError: if it is beyond the volume.
     """
-    place = place_at(grid, (0, 0, 0) if at is None else grid.world.in_world(np.array(at)).tolist())
+    place = place_at(grid, (0, 0, 0) if at is None else grid.world.in_world(np.array(at)).tolist(), labels)
     if place is None:
         low, high = grid.world.points(np.array(grid.aabb)).round(4).tolist()
         raise ArgumentError(f"at: expected a place in the volume, from {low} to {high}, got {at}")

@@ -80,9 +80,9 @@ def slice_of(grid: Grid, plane: SlicePlane, number: int, channel: int = 0) -> np
 
 
 def place_at(grid: Grid, point: Sequence[float], labels: Labels = NO_LABELS) -> Place | None:
-    """Return the sample that is closest to a point of the world, or None beyond the outermost ones."""
+    """Return the sample closest to a point of the world, or None over half a sample beyond the outermost."""
     dims, steps = np.array(grid.dims), np.array(point) / grid.scale / grid.spacing  # from the middle
-    if (np.abs(steps) > 0.5 * dims).any():
+    if not (np.abs(steps) <= 0.5 * dims).all():
         return None
     stored = np.rint(steps + 0.5 * (dims - 1)).astype(int).clip(0, dims - 1)
     ways = (stored.tolist(), (dims - 1 - stored).tolist())

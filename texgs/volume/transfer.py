@@ -45,8 +45,8 @@ class TransferFunction:
         low, high = self.support
         if not low < high:
             raise ArgumentError("opacity: expected some values with opacity above 0, got none; raise a point")
-        for name, number in (("channel", self.channel), ("within", self.within or 0)):
-            if type(number) is not int or number < 0:
+        for name, number in (("channel", self.channel), ("within", self.within)):
+            if (name, number) != ("within", None) and (type(number) is not int or number < 0):
                 raise ArgumentError(f"{name}: expected a number from 0 on, got {number!r:.100}")
 
     @property

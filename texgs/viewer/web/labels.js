@@ -15,7 +15,7 @@ const COVER = 0.6; // of a label over an image
  */
 export function labelsOf(scene, channels) {
   const shown = shownOf({ ...scene, functions: {} }), isLabel = ({ opacity }) =>
-    opacity[0][0] === HALF && opacity.at(-1)[0] === INSIDE;
+    opacity[0][0] === HALF && opacity[0][1] > 0 && opacity.at(-1)[0] === INSIDE;
   const labels = Object.entries(scene.tfs).filter(([, tf]) => isLabel(tf)).map(([name, tf]) => {
     const channel = placeOf(tf.channel, channels), own = shown.find((each) => each.name === name);
     return { name, channel, half: halfOf(channels[channel]), color: own ? own.colorAt(INSIDE) : null };

@@ -11,7 +11,7 @@ const areThree = (x, low, high) => Array.isArray(x) && x.length === 3 && x.every
 const isColor = (x) => areThree(x, 0, 1);
 const isFactor = (x) => isNumber(x, 0, MOST_FACTOR);
 const isPlane = (x) => areThree(x?.normal) && Math.hypot(...x.normal) >= 1 / MOST && isNumber(x.offset);
-const isWindow = (x) => Array.isArray(x) && x.length === 2 && x.every(Number.isFinite);
+const isWindow = (x) => Array.isArray(x) && x.length === 2 && x.every(Number.isFinite) && x[0] < x[1];
 const isBox = (x) => areThree(x?.low) && areThree(x?.high) && x.low.every((low, i) => low < x.high[i]);
 const arePoints = (x, columns, least) => Array.isArray(x) && x.length >= least && x.every((row, i) =>
   Array.isArray(row) && row.length === columns && Number.isFinite(row[0]) && !(row[0] < x[i - 1]?.[0])

@@ -148,7 +148,7 @@ void main() {
 
   vec3 last = vec3(textureSize(samples0, 0) - 1), texel = 1.0 / (last + 1.0);
   vec3 at_face = from + begin * along;
-  if (is_slice && face >= 0 && begin < end && most(abs(at_face) - box) <= 0.0) {
+  if (is_slice && face >= 0 && begin < end && most(abs(at_face) - box) <= 1e-5) {
     vec3 at = (0.5 * last + 0.5 * last / box * at_face + 0.5) * texel;
     fragment = vec4(is_depth ? vec3(begin / length(camera)) : slice_at(at), 1.0);
     return;
