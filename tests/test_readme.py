@@ -17,6 +17,7 @@ import nibabel
 import numpy as np
 import pytest
 import pyvista
+import SimpleITK
 
 import texgs
 from tests.fitting.short_fits import shorten
@@ -99,7 +100,10 @@ def project(tmp_path_factory):
     grid = pyvista.ImageData(dimensions=values.shape)
     grid.point_data["ImageScalars"] = values.ravel(order="F")
     grid.save(folder / "engine.vti")
-    nibabel.save(nibabel.Nifti1Image(values, np.eye(4)), folder / "scan.nii.gz")
+    labels = np.digitize(values, np.quantile(values, [0.8, 0.9])).astype(np.uint8)
+    for name, samples in (("scan", values), ("ct", values), ("segmentation", labels)):
+        nibabel.save(nibabel.Nifti1Image(samples, np.eye(4)), folder / f"{name}.nii.gz")
+    SimpleITK.WriteImage(SimpleITK.GetImageFromArray(labels), folder / "segmentation.seg.nrrd")
     return folder
 
 
