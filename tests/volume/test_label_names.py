@@ -133,6 +133,18 @@ def test_names_are_text_that_settings_hold_and_never_numbers():
     ]  # fmt: skip
 
 
+def test_numbers_of_segments_may_have_gaps(tmp_path):
+    image = SimpleITK.GetImageFromArray(np.zeros((4, 4, 4), np.uint8))
+    for number, name in ((0, "liver"), (7, "bone")):
+        image.SetMetaData(f"Segment{number}_Name", name)
+        image.SetMetaData(f"Segment{number}_LabelValue", str(number + 3))
+    SimpleITK.WriteImage(image, tmp_path / "a.seg.nrrd")
+    assert {(each.number, each.name) for each in segments_of(tmp_path / "a.seg.nrrd")} == {
+        (3, "liver"),
+        (10, "bone"),
+    }
+
+
 def test_a_table_is_given_or_lies_beside_the_file(tmp_path, monkeypatch):
     path = tmp_path / "seg.v2.nii.gz"
     assert named_in(path, None) == named_in(type(path)(), None) == ([], None)

@@ -13,6 +13,7 @@ from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import reading_as
 from texgs.volume.headers import NRRD, read_fields
 
+SEGMENT = re.compile(r"segment(\d+)_name=")  # there may be gaps between numbers
 SEGMENTATION = ".seg.nrrd"  # of 3D Slicer; its header names segments
 TABLES = (".label", ".ctbl", ".txt")  # suffixes of tables beside a file of labels
 FREESURFER = (".mgz", ".mgh")
@@ -47,7 +48,7 @@ def segments_of(path: Path) -> list[Label]:
     labels: list[Label] = []
     with errors_at(path), reading_as("segments of 3D Slicer"):
         fields, _ = read_fields(path)
-        for k in range(sum(name.startswith("segment") and name.endswith("_name=") for name in fields)):
+        for k in sorted(int(found[1]) for found in map(SEGMENT.fullmatch, fields) if found):
             name, value, color, layer = (
                 fields.get(f"segment{k}_{key}=", "") for key in ("name", "labelvalue", "color", "layer")
             )

@@ -204,7 +204,8 @@ export class ScenePage {
 
   #rest(moving) {
     if (moving) this.renderer.draw(this.camera, this.state.scene, { moving: false, ...this.#shown });
-    const { mode, legend } = this.#shown, asked = (OPTIONS[mode] ?? ` --mode ${mode}`) || (legend ? " --legend" : "");
+    const { mode, legend } = this.#shown, marked = legend && !OPTIONS[mode] ? " --legend" : ""; // not beside --compare
+    const asked = `${OPTIONS[mode] ?? ` --mode ${mode}`}${marked}`;
     get("options").textContent = `texgs render ${this.camera.options(...this.renderer.size())}${asked}`;
     try {
       history.replaceState(null, "", `#${this.#fragment}`);
