@@ -1,7 +1,8 @@
-"""Sources from objects of other libraries, known by their methods: none of these is imported."""
+"""Sources from files, and from objects of other libraries, known by their methods: none is imported."""
 
 from collections.abc import Callable, Mapping, Sequence
 from operator import index
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,25 +13,33 @@ from texgs.core.names import check_count
 from texgs.volume.grid import ONES, ZEROS, Grid, Triple
 from texgs.volume.layers import labelled_source
 from texgs.volume.slabs import ArraySource, Source
+from texgs.volume.sources import open_source
 from texgs.volume.space import UNKNOWN_SPACE, Space
+
+Numbers = Sequence[float] | None
 
 
 def source_of(
-    data: Any, name: str, spacing: Sequence[float] | None, origin: Sequence[float] | None
+    data: Any, layer: str | None, name: str, spacing: Numbers, origin: Numbers, keys: Mapping[str, Any]
 ) -> Source:
-    """Return an array [Z, Y, X], an ImageData of PyVista or a DataArray of xarray as a source.
+    """Return a file, an array [Z, Y, X], an ImageData of PyVista or a DataArray of xarray as a source.
 
     Args:
         data: of PyVista's arrays the active scalars count, else the first one of points, or else of cells.
             Those of xarray are read as files with labels are, see `texgs.volume.axes.axes_of`.
-        name: for messages.
+        layer: of a file with several: its channel.
+        name: of data without a file, for messages.
         spacing: x, y, z, in place of the object's own.
         origin: the same.
+        keys: of the format of a file.
 
     Raises:
         ArgumentError, ShapeError: if there is no scalar field on a regular lattice.
     """
     said = several("spacing", spacing, 3), several("origin", origin, 3)
+    if isinstance(data, str | Path):
+        keys = keys if layer is None else {**keys, "channel": layer}
+        return open_source(data, spacing=said[0], origin=said[1], **keys_of_format(keys))
     if hasattr(data, "data_vars"):
         names = ", ".join(map(str, data.data_vars))
         raise ArgumentError(f"data: expected one array, got a Dataset of {names}; choose one by its name")

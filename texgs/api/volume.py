@@ -14,7 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from texgs.api.arrays import keys_of_format, several, source_of
+from texgs.api.arrays import several, source_of
 from texgs.api.display import as_python, inline, picture_of
 from texgs.api.functions import AnyFunctions, Functions, named
 from texgs.api.keywords import takes
@@ -40,7 +40,7 @@ from texgs.volume.slabs import Source
 from texgs.volume.slice_keys import SliceKeys
 from texgs.volume.slice_picture import sample_at, slice_picture
 from texgs.volume.slices import Place
-from texgs.volume.sources import open_source, tells_superior
+from texgs.volume.sources import tells_superior
 from texgs.volume.suggest import suggest
 from texgs.volume.summaries import Summary, write_summaries
 
@@ -104,23 +104,23 @@ class Volume:
     ) -> None:
         if name is not None and not isinstance(name, str):
             raise ArgumentError(f"name: expected words, got {name!r}")
+        if keys and not isinstance(data, str | Path):
+            hint = close(next(iter(keys)), signature(Volume).parameters)
+            raise ArgumentError(f"{', '.join(keys)}: not for arrays{hint or '; leave them out'}")
         self.name = name = default_name(data) if name is None else name
         self._scratch = TemporaryDirectory(prefix="texgs-") if folder is None else None
         self.folder = Path(folder if folder is not None else self._scratch.name)  # type: ignore[union-attr]
         crop, nan_value = several("crop", crop, 6, index), as_python(nan_value)
-        open_file = partial(opened, name=name, spacing=spacing, origin=origin, keys=keys)
+        open_file = partial(source_of, name=name, spacing=spacing, origin=origin, keys=keys)
         shown, sources = sources_of(data, open_file, kind, labels, names, crop, reduce)
         self._channel = sources[0].channel
         if up is None:
             up = "+z" if isinstance(data, str | Path) and tells_superior(Path(data)) else "+y"
         how = {"crop": crop, "reduce": reduce, "method": method, "up": up, "nan_value": nan_value}
         self.summary, *others = self._prepared(sources, how)
-        if note := sources[0].note:
-            warnings.warn(f"{name}: {note.replace('dataset.volume.', '')}", stacklevel=2)
         self.grid = open_grid(self.file)  # samples [Z, Y, X] with spacing and origin, +y up
         prepared = ["" if each.label is None else mask_name(each.label) for each in sources]
-        # An image is "", and then come masks.
-        self.channels = dict(zip(prepared, (self.summary, *others), strict=True))
+        self.channels = dict(zip(prepared, (self.summary, *others), strict=True))  # "" is an image
         write_summaries(self.file, [*self.channels.values()], prepared)
         self._labels = {name: function_of(tf, prepared) for name, tf in shown.items()}
         self._colors = {name: (tf.channel, tf(INSIDE)[:3]) for name, tf in self._labels.items()}
@@ -152,6 +152,8 @@ class Volume:
                     "or remove that file"
                 )
             made.replace(self.file)
+        if note := sources[0].note:
+            warnings.warn(f"{self.name}: {note.replace('dataset.volume.', '')}", stacklevel=3)
         return summaries
 
     def suggest(self, count: int | None = None) -> Functions:
@@ -233,25 +235,6 @@ class Volume:
         cells = "".join(f"<tr><th>{key}</th><td>{escape(value)}</td></tr>" for key, value in rows.items())
         picture = inline(self.render(width=CELL_WIDTH), self.name)
         return f"<b>{escape(self.name)}</b><div>{picture}<table>{cells}</table></div>"
-
-
-def opened(
-    data: Any,
-    layer: str | None,
-    name: str,
-    spacing: Sequence[float] | None,
-    origin: Sequence[float] | None,
-    keys: dict[str, Any],
-) -> Source:
-    """Return a file, a layer of it or an array as a source; arguments as for `Volume`."""
-    if isinstance(data, str | Path):
-        steps, first = several("spacing", spacing, 3), several("origin", origin, 3)
-        said = keys if layer is None else {**keys, "channel": layer}
-        return open_source(data, spacing=steps, origin=first, **keys_of_format(said))
-    if keys:
-        hint = close(next(iter(keys)), signature(Volume).parameters)
-        raise ArgumentError(f"{', '.join(keys)}: not for arrays{hint or '; leave them out'}")
-    return source_of(data, name, spacing, origin)
 
 
 def default_name(data: Any) -> str:
