@@ -44,17 +44,14 @@ def basic_tf_of(tf: TransferFunction, prepared: Sequence[str]) -> BasicTF:
     Raises:
         ArgumentError: if there is no such channel, or `within` is not that of a mask.
     """
-    labels = [
-        name.partition(mask_name(""))[2] if name.startswith(mask_name("")) else None for name in prepared
-    ]
-    for name, number in (("channel", tf.channel), ("within", tf.within)):
-        known = [k for k, each in enumerate(labels) if name == "channel" or each is not None]
+    points, mark = tf.to_dict(), mask_name("")
+    masks = {k: name.removeprefix(mark) for k, name in enumerate(prepared) if name.startswith(mark)}
+    for of, number, known in (("channel", tf.channel, range(len(prepared))), ("within", tf.within, masks)):
         if number not in (None, *known):
-            raise ArgumentError(f"{name}: expected one of {known}, got {number}")
-    channel = None if labels[tf.channel] else prepared[tf.channel] or None
-    within = None if tf.within is None else labels[tf.within]
-    points = tf.to_dict()
-    return BasicTF(points["opacity"], points["color"], channel, labels[tf.channel], within)
+            raise ArgumentError(f"{of}: expected one of {[*known]}, got {number}")
+    channel = None if tf.channel in masks else prepared[tf.channel] or None
+    within = None if tf.within is None else masks[tf.within]
+    return BasicTF(points["opacity"], points["color"], channel, masks.get(tf.channel), within)
 
 
 def function_of(tf: BasicTF, prepared: Sequence[str]) -> TransferFunction:

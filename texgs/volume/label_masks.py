@@ -25,12 +25,7 @@ class MaskSource(Source):
     """The softened mask of a label [Z, Y, X], uint8: 255 inside, 0 outside, and between them at its surface.
 
     Softening moves the surface by less than half a voxel: the samples of a label stay inside, all others
-    outside, so that nothing thin is lost and nothing grows together.
-
-    Args:
-        labels: the volume that the label is in.
-        number: of the label.
-        name: of the label, for messages.
+    outside, so that nothing thin is lost and nothing grows together. A label without a name has its number.
     """
 
     def __init__(self, labels: Source, number: int, name: str = "") -> None:
