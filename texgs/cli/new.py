@@ -69,12 +69,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="transfer functions to take instead: JSON, or ParaView presets",
     )
-    parser.add_argument(
-        "--names",
-        type=Path,
-        metavar="FILE",
-        help="names and colours of labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer",
-    )
+    table = "names and colours of labels: a table of ITK-SNAP, FreeSurfer or 3D Slicer"
+    parser.add_argument("--names", type=Path, metavar="FILE", help=table)
     parser.add_argument("--force", action="store_true", help="replace a data set of that name")
 
 

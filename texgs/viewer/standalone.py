@@ -102,12 +102,8 @@ def scene_page(
         description["held"] = list(moved.packed)
     description["can_shadow"] = volume is not None or light is not None
     if volume is not None:
-        description |= {
-            "volume": volume.describe(scene),
-            "presets": presets(),
-            "slices": volume.slices(scene),
-        }
-        description["transfer"] = Origins(scene).transfer
+        description |= {"volume": volume.describe(scene), "presets": presets()}
+        description |= {"slices": volume.slices(scene), "transfer": Origins(scene).transfer}
     view = description["views"][0] | {"fov_y": description["fov_y"]}
     picture = poster(scene, composed, view, twin, has_faces=volume is not None)
     html = page_of(description, surfels, picture, checked, volume, moved, light)

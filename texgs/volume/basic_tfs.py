@@ -25,12 +25,8 @@ class BasicTF:
     channel: str | None = key(
         None, "label or number of the channel of these values, from 0, where the data set shows several"
     )
-    label: str | None = key(
-        None, "name or number of the label that is shown: values are 0 to 255 of its mask"
-    )
-    within: str | None = key(
-        None, "name or number of the label that values are shown in; elsewhere nothing is"
-    )
+    label: str | None = key(None, "name or number of the label that is shown, by 0 to 255 of its mask")
+    within: str | None = key(None, "name or number of the label that values are shown in, and nowhere else")
 
     @property
     def values_of(self) -> str | None:

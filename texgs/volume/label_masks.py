@@ -29,13 +29,8 @@ class MaskSource(Source):
     """
 
     def __init__(self, labels: Source, number: int, name: str = "") -> None:
-        super().__init__(
-            f"label {name or number} of {labels.name}",
-            labels.dims,
-            np.dtype(np.uint8),
-            labels.spacing,
-            labels.origin,
-        )
+        lattice, called = (labels.spacing, labels.origin), f"label {name or number} of {labels.name}"
+        super().__init__(called, labels.dims, np.dtype(np.uint8), *lattice)
         self.label = name or str(number)
         self._labels, self._number, self.space, self.note = labels, number, labels.space, labels.note
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -62,9 +62,7 @@ class VolumeKeys:
     method: str = key("mean", "how samples are reduced", choices=("mean", "sample"))
     kind: str = key("image", "what samples are; labels have a mask each", choices=("image", "labels"))
     labels: str | None = key(None, "file of labels on the lattice of the image; relative to data_folder")
-    label_numbers: dict[str, int] = field(
-        default_factory=dict, metadata={"help": "numbers of labels by name, where the file has no names"}
-    )
+    label_numbers: dict[str, int] = key(dict, "numbers of labels by name, where the file has no names")
     up: str = key("+y", "axis of the volume that points up in the world", choices=AXES)
     nan_value: float | None = key(None, "replaces NaN; without it NaN is an error")
 

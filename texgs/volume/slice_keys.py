@@ -16,9 +16,7 @@ class SliceKeys:
     at: tuple[float, float, float] | None = key(
         None, "place that slices go through, in space and unit of the volume's file; default the middle"
     )
-    window: tuple[float, float] | None = key(
-        None, "values in black and in white; default what 99 % are between"
-    )
+    window: tuple[float, float] | None = key(None, "values in black and white; default 99 % lie between")
     width: int = key(800, "of the picture", "pixels", least=16, most=LARGEST)
 
     def __post_init__(self) -> None:
