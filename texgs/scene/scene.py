@@ -50,13 +50,13 @@ class SceneVolume:
         Raises:
             ArgumentError: if it cannot be read, or was made again with masks of other labels.
         """
-        now = ", ".join(masks_in(self.file))
-        if self.labels and now != ", ".join(self.labels):
+        grid, expected = open_grid(self.file), ", ".join(self.labels)
+        if expected and expected != (now := ", ".join(masks_in(self.file))):
             raise ArgumentError(
-                f"{self.file}: expected masks of the labels {', '.join(self.labels)}, as the scene has them, "
-                f"got {now or 'none'}; make the scene again by texgs compose"
+                f"{self.file}: expected masks of the labels {expected}, as the scene has them, got "
+                f"{now or 'none'}; make the scene again by texgs compose"
             )
-        return open_grid(self.file)
+        return grid
 
 
 @dataclass(frozen=True)
