@@ -100,11 +100,13 @@ def fit_now_into(
     from texgs.scene.scene import SceneModel, SceneVolume
     from texgs.scene.scene_file import write_scene
     from texgs.volume.framing import frame_of
+    from texgs.volume.nrrd_file import masks_in
 
     files = {name: folder / file_name("functions", f"{name}.safetensors") for name in functions}
     if (folder / SCENE).exists():
         warnings.warn(f"{folder} holds a scene, which this replaces; another folder keeps both", stacklevel=3)
-    made_of, frame = SceneVolume(copied(volume, folder), functions), frame_of(volume.grid, functions.values())
+    file, frame = copied(volume, folder), frame_of(volume.grid, functions.values())
+    made_of = SceneVolume(file, functions, labels=tuple(masks_in(file)))
     models = {}
     for name, tf in functions.items():
         (model,) = models_of(made_of, tf, frame, name, device, size, seed=seed, soon=False)

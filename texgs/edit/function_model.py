@@ -18,7 +18,6 @@ from texgs.scene.scene import Scene, SceneModel, SceneVolume, volume_of
 from texgs.scene.session import Session
 from texgs.volume.caster import Caster
 from texgs.volume.framing import frame_of
-from texgs.volume.nrrd_file import open_grid
 from texgs.volume.transfer import TransferFunction, overlapping
 
 SIZE = 400  # pixels of either side of the views
@@ -56,7 +55,7 @@ def fit_function(
     for other, entry in scene.models.items():
         if (kind := kind_of(entry.file).name) != "surfels":
             raise ArgumentError(f"models.{other}: expected surfels, which a new model can join, got {kind}")
-    frame = frame_of(open_grid(volume.file), [tf])
+    frame = frame_of(volume.open(), [tf])
     models = models_of(volume, tf, frame, name, device, size)
     for model in models if soon else [*models][-1:]:
         let_stop(name)
@@ -78,7 +77,7 @@ def models_of(
     **options: Any,
 ) -> Iterator[Surfels]:
     """Yield models of a volume under a function, in views of a frame; for options see `fit_now`."""
-    caster = Caster(open_grid(volume.file), volume.appearance, device)
+    caster = Caster(volume.open(), volume.appearance, device)
     lens = frame.lens(width=size, height=size)
     return fit_now(caster, volume.appearance, tf, lens, name, **options)
 

@@ -27,7 +27,6 @@ from texgs.scene.parts import entry_of, key_path
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import SEGMENT_KEYS, cuts_of, plain_cuts, require_keys
 from texgs.scene.session import SCENE_KEYS, Session
-from texgs.volume.nrrd_file import open_grid
 from texgs.volume.space import Space
 
 CUT_NUMBER = re.compile(r"cut\.([1-9])=")
@@ -235,6 +234,6 @@ def _place(scene: Scene, word: str, axis: int | None) -> float:
     number = float(word.removesuffix(VOXEL_SUFFIX))
     if scene.volume is None:
         raise ArgumentError("expected world units, got samples: this scene names no volume")
-    grid = open_grid(scene.volume.file)
+    grid = scene.volume.open()
     low, high = (corner[axis] for corner in grid.aabb)
     return low + (high - low) * number / (grid.dims[axis] - 1)

@@ -25,6 +25,8 @@ from texgs.fields.surfels.variants import labels_of, with_texture, with_variants
 from texgs.scene.bounds import bounds_of, models_of
 from texgs.scene.segment_file import read_segment
 from texgs.scene.series_file import Series
+from texgs.volume.grid import Grid
+from texgs.volume.nrrd_file import masks_in, open_grid
 from texgs.volume.render import Appearance
 from texgs.volume.space import Space
 from texgs.volume.transfer import TransferFunction
@@ -40,6 +42,21 @@ class SceneVolume:
     file: Path  # volume.nrrd, prepared
     tfs: Mapping[str, TransferFunction]  # basic TFs, by the names of models
     appearance: Appearance = field(default_factory=Appearance)
+    labels: tuple[str, ...] = ()  # of its masks, in whose order functions have their numbers
+
+    def open(self) -> Grid:
+        """Map the volume into memory.
+
+        Raises:
+            ArgumentError: if it cannot be read, or was made again with masks of other labels.
+        """
+        grid, expected = open_grid(self.file), ", ".join(self.labels)
+        if expected and expected != (now := ", ".join(masks_in(self.file))):
+            raise ArgumentError(
+                f"{self.file}: expected masks of the labels {expected}, as the scene has them, got "
+                f"{now or 'none'}; make the scene again by texgs compose"
+            )
+        return grid
 
 
 @dataclass(frozen=True)

@@ -35,7 +35,7 @@ SEGMENT_KEYS = ("file", "texture", *EDIT_KEYS)
 MODEL_KEYS = (*SEGMENT_KEYS, "segments")
 LIGHT_KEYS = tuple(each.name for each in fields(Light))
 APPEARANCE_KEYS = tuple(each.name for each in fields(Appearance))
-VOLUME_KEYS = ("file", *APPEARANCE_KEYS, "tfs")
+VOLUME_KEYS = ("file", *APPEARANCE_KEYS, "labels", "tfs")
 
 
 def read_scene(path: str | Path) -> Scene:
@@ -120,7 +120,8 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
     if scene.volume is not None:
         look = asdict(scene.volume.appearance)
         tfs = plain_functions(scene.volume.tfs)
-        values["volume"] = {"file": relative(scene.volume.file), **look, "tfs": tfs}
+        labels = {"labels": [*scene.volume.labels]} if scene.volume.labels else {}
+        values["volume"] = {"file": relative(scene.volume.file), **look, **labels, "tfs": tfs}
     if scene.space is not None:
         values["space"] = asdict(scene.space)
     if scene.series is not None:
@@ -175,7 +176,10 @@ def volume_of(values: Any, folder: Path) -> SceneVolume:
     functions = functions_of(values.get("tfs"), "volume.tfs")
     with errors_at("volume", "."):
         look = Appearance(**{key: value for key, value in values.items() if key in APPEARANCE_KEYS})
-    return SceneVolume(file, functions, look)
+    labels = values.get("labels", [])
+    if not isinstance(labels, list) or not all(isinstance(each, str) for each in labels):
+        raise ArgumentError(f"volume.labels: expected a list of names, got {labels!r:.100}")
+    return SceneVolume(file, functions, look, tuple(labels))
 
 
 def functions_of(values: Any, where: str) -> dict[str, TransferFunction]:

@@ -27,7 +27,6 @@ from texgs.volume.caster import Cast, Caster
 from texgs.volume.label_masks import INSIDE, shows_label
 from texgs.volume.light_cells import LightCells
 from texgs.volume.matter import Matter
-from texgs.volume.nrrd_file import open_grid
 from texgs.volume.overlay import overlays
 from texgs.volume.slices import Labels, window_of
 from texgs.volume.transfer import TransferFunction
@@ -51,7 +50,7 @@ class Twin:
     def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
         self._volume, self._device, self._by_cell = volume_of(scene), torch.device(device), True
         with errors_at("volume"):
-            self.grid = open_grid(self._volume.file)
+            self.grid = self._volume.open()
             self._caster = Caster(self.grid, self._volume.appearance, device)
         self._matter = deque[tuple[object, Matter]](maxlen=1)  # the latest, of all copies
         self._cells = deque[tuple[object, LightCells]](maxlen=1)

@@ -20,7 +20,6 @@ from texgs.scene.scene import Scene
 from texgs.scene.scene_file import plain_functions
 from texgs.scene.shot import Mode
 from texgs.volume.grid import closest
-from texgs.volume.nrrd_file import open_grid
 from texgs.volume.space import LETTERS, Space
 
 LENS = Lens()
@@ -60,7 +59,7 @@ def bounds(scene: Scene, composed: Composed) -> dict[str, Any]:
     ball = {"center": list(framed.target), "radius": framed.radius}
     with suppress(TexgsError):  # the error is told to whoever shows the volume
         if scene.volume is not None:
-            grid = open_grid(scene.volume.file)
+            grid = scene.volume.open()
             return {**ball, "low": grid.aabb[0], "high": grid.aabb[1], "scale": grid.scale}
     low, high = zip(
         *(span_of(models_of(composed), framed, axis, STRAY_SHARE) for axis in np.eye(3).tolist()), strict=True

@@ -14,7 +14,7 @@ from torch.nn import functional as F
 from texgs.core.errors import ArgumentError, errors_at
 from texgs.scene.scene import Scene, volume_of
 from texgs.volume.grid import Grid, Triple
-from texgs.volume.nrrd_file import REMEDY, open_grid
+from texgs.volume.nrrd_file import REMEDY
 from texgs.volume.slices import planes_of, window_of
 
 MEGABYTE = 10**6
@@ -59,7 +59,7 @@ class PageVolume:
 
     def slices(self, scene: Scene) -> dict[str, Any]:
         """Return planes of slices of the file, and what a page needs beside the samples to draw them."""
-        grid, (low, high) = open_grid(volume_of(scene).file), self.ends[0]
+        grid, (low, high) = volume_of(scene).open(), self.ends[0]
         step = self.step * (high - low) / LEVELS
         facts = {"window": window_of(grid), "step": step, "matrix": grid.world.matrix}
         return {"planes": [asdict(plane) for plane in planes_of(grid)], **facts}
@@ -75,7 +75,7 @@ def page_volume(scene: Scene, budget: float) -> PageVolume:
     shown = [number for tf in (*source.tfs.values(), *scene.functions.values()) for number in tf.source]
     numbers = sorted({0, *(number for number in shown if number is not None)})  # slices show the first
     with errors_at("volume"):
-        grid = open_grid(source.file)
+        grid = source.open()
         first, *others = [grid.channel(number) for number in numbers]
         grid = replace(first, others=tuple(each.values for each in others))
         return replace(within(grid, budget * MEGABYTE), numbers=numbers)

@@ -15,7 +15,6 @@ from texgs.scene.session import Session
 from texgs.viewer.messages import Place, Slice, parse
 from texgs.volume.grid import Grid
 from texgs.volume.label_masks import shows_label
-from texgs.volume.nrrd_file import open_grid
 from texgs.volume.slices import Labels, place_at, planes_of, slice_colors, slice_of, window_of
 
 
@@ -29,7 +28,7 @@ class Slices:
     def facts(self) -> dict[str, Any] | None:
         """Return the planes and a window; None where the scene names no volume that can be read."""
         with suppress(TexgsError):  # it is told to whoever shows the volume
-            grid = open_grid(volume_of(self._session.scene).file)
+            grid = volume_of(self._session.scene).open()
             return {"planes": [asdict(each) for each in planes_of(grid)], "window": window_of(grid)}
         return None
 
@@ -63,4 +62,4 @@ class Slices:
         palettes = self._session.composition_of(scene).palettes
         has_labels = any(map(shows_label, volume_of(scene).tfs.values()))
         labels = self._session.twin_of(scene).labels(scene, palettes) if has_labels else {}
-        return open_grid(volume_of(scene).file), labels
+        return volume_of(scene).open(), labels

@@ -45,7 +45,6 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.scene.scene import Scene, SceneModel
     from texgs.scene.scene_file import write_scene
     from texgs.volume.framing import frame_of
-    from texgs.volume.nrrd_file import open_grid
 
     models = {
         name.removeprefix(MODEL): SceneModel(path) for name, path in inputs.items() if name.startswith(MODEL)
@@ -54,7 +53,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     scene = Scene(models, volume=volume)
     if volume is not None:
         framing = [tf for name, tf in volume.tfs.items() if name in settings.framing]
-        grid = open_grid(volume.file)
+        grid = volume.open()
         scene = replace(scene, frame=frame_of(grid, framing), space=grid.world)
     write_scene(output / SCENE, scene)
     composition = scene.open(torch_device(settings.fit.device))
@@ -67,11 +66,12 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 def volume_of(settings: Settings, volume: Path) -> SceneVolume:
     """Return the volume with its basic TFs as views show it."""
     from texgs.scene.scene import SceneVolume
+    from texgs.volume.nrrd_file import masks_in
     from texgs.volume.render import Appearance
 
     tfs = basic_tfs_of(volume, settings.basic_tfs, settings.tf_values)
     look = Appearance(**asdict(settings.shading), step=settings.step, opacity_unit=settings.opacity_unit)
-    return SceneVolume(volume, tfs, look)
+    return SceneVolume(volume, tfs, look, tuple(masks_in(volume)))
 
 
 STAGE = Stage(
