@@ -129,10 +129,8 @@ class Twin:
                 by_cell=self._by_cell,
                 cells=self._lit(scene, shown) if scene.light.casts_shadows else None,
             )
-        seen = casts.get(edit.tint[0]) or Cast(
-            torch.zeros(camera.height, camera.width, 4, device=self._device),
-            **{name: torch.zeros(camera.height, camera.width, device=self._device) for name in outputs},
-        )
+        clear = torch.zeros(camera.height, camera.width, 4, device=self._device)
+        seen = casts.get(edit.tint[0]) or Cast(clear, **{name: clear[..., 0].clone() for name in outputs})
         for channel, share in enumerate(edit.tint[1:], start=1):
             if share != edit.tint[0]:
                 seen.rgba[..., channel] = casts[share].rgba[..., channel]

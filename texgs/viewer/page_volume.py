@@ -50,10 +50,8 @@ class PageVolume:
 
     def describe(self, scene: Scene) -> dict[str, Any]:
         """Return what a page needs beside the samples to draw the volume of a scene."""
-        channels = [
-            {"number": number, "low": low, "high": high}
-            for number, (low, high) in zip(self.numbers, self.ends, strict=True)
-        ]
+        known = zip(self.numbers, self.ends, strict=True)
+        channels = [{"number": number, "low": low, "high": high} for number, (low, high) in known]
         facts = {"channels": channels, "half": self.half, "looks": scene.has_looks}
         return {**facts, "appearance": asdict(volume_of(scene).appearance)}
 
