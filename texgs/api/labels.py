@@ -10,8 +10,7 @@ from typing import Any
 from texgs.config.label_tfs import label_tfs
 from texgs.core.errors import ArgumentError
 from texgs.core.names import check_count
-from texgs.volume.basic_tfs import BasicTF
-from texgs.volume.grid import MAX_CHANNELS
+from texgs.volume.basic_tfs import MAX_CHANNELS, BasicTF
 from texgs.volume.label_choice import choose, labels_in
 from texgs.volume.label_masks import MaskSource, on_lattice_of
 from texgs.volume.label_names import named_in

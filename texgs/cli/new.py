@@ -172,7 +172,7 @@ def array_of(volume: VolumeKeys) -> Source | None:
 
 def with_room(config: Config, field: Source, channels: int, labels: int) -> Config:
     """Return a configuration whose channels and masks take at most half of the free memory; say how."""
-    from texgs.volume.grid import MAX_CHANNELS
+    from texgs.volume.basic_tfs import MAX_CHANNELS
     from texgs.volume.prepare import bounds_of
 
     dataset, volume = config.dataset, config.dataset.volume

@@ -85,7 +85,7 @@ def found_in(dataset: Dataset, table: Path | None, channel: str | None) -> list[
 def with_chosen(dataset: Dataset, found: list[Label], wanted: list[str] | None, channels: int) -> Dataset:
     """Return a data set with basic TFs of wanted labels, or of the largest; say which are left out."""
     from texgs.config.label_tfs import label_tfs
-    from texgs.volume.grid import MAX_CHANNELS
+    from texgs.volume.basic_tfs import MAX_CHANNELS
     from texgs.volume.label_choice import choose
 
     if not found and wanted:

@@ -14,6 +14,8 @@ from texgs.core.names import mask_name
 if TYPE_CHECKING:
     from texgs.volume.transfer import TransferFunction
 
+MAX_CHANNELS = 16  # and masks, of a data set: the caster shows so many together
+
 
 @dataclass(frozen=True)
 class BasicTF:

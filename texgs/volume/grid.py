@@ -10,7 +10,6 @@ from texgs.core.memory import require_memory
 from texgs.volume.space import UNKNOWN_SPACE, Space, Triple
 
 Dims = tuple[int, int, int]
-MAX_CHANNELS = 16  # that the caster shows together
 ONES, ZEROS = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 
 # Where the new axes x, y, z come from: (axis before, sign).

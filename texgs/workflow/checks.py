@@ -12,8 +12,7 @@ from texgs.edit.method import NO_METHOD, method_of, methods
 from texgs.fields.kinds import Kind, kinds, require
 from texgs.fields.surfels.material import require_material
 from texgs.fitting.kinds import fit_specs
-from texgs.volume.basic_tfs import function_of
-from texgs.volume.grid import MAX_CHANNELS
+from texgs.volume.basic_tfs import MAX_CHANNELS, function_of
 from texgs.workflow.edits import OF_ONE, chain_of, looks_of, require_parts
 from texgs.workflow.inputs import scene_before
 from texgs.workflow.stage import Stage
