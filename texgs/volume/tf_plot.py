@@ -27,6 +27,7 @@ PLOT_INCHES, DPI = (10.0, 4.5), 100  # inches, dots per inch: plots by themselve
 SAMPLES = 512
 CAST_PIXELS, CAST_INCHES = 160, 1.9  # pixels of a side of a cast, height of the row of them
 CASTS = 6  # casts of labels in a row
+LEAST_BARS = 4  # that a panel has room for, so that the bar of a single label is no block
 
 
 def plot(
@@ -88,6 +89,7 @@ def _fill_sizes(
         bar = axes.barh(words(name), size, color=tf.color[0][1:])
         axes.bar_label(bar, [f"{size:,.0f}" if size >= 1000 else f"{size:.3g}"], padding=4)
     axes.margins(x=0.12)
+    axes.set_ylim(-0.6, max(len(labels), LEAST_BARS) - 0.4)
     axes.set_xlabel(f"{unit}³" if unit else "samples")
 
 
