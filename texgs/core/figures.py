@@ -173,10 +173,11 @@ def draw_row(figure: Figure, row: Row, top: float, wide: float, tall: float) -> 
         return axes
 
     size = fitting([cell.title for cell in row.cells], wide)
+    small = min(SMALL, fitting([cell.words for cell in row.cells if cell.pixels is not None], wide + GAP))
     for index, cell in enumerate(row.cells):
         left = LEFT + index * (wide + GAP)
         if cell.pixels is not None or cell.words or cell.title:
-            fill(axes_at(left, top, wide, tall), cell, size)
+            fill(axes_at(left, top, wide, tall), cell, size, small)
         if cell.scale is not None:
             fill_bar(axes_at(left + 0.33 * wide, top + tall + 0.07, 0.34 * wide, 0.1), cell.scale)
     x, y = 0.5 * LEFT / page_width, 1 - (top + 0.5 * tall) / page
@@ -189,8 +190,8 @@ def fitting(texts: Iterable[str], inches: float) -> float:
     return min(MEDIUM, 72 * inches / (LETTER * max(longest, 1)))
 
 
-def fill(axes: Axes, cell: Cell, size: float) -> None:
-    """Draw a cell: its picture or words, with the title above and the caption below."""
+def fill(axes: Axes, cell: Cell, size: float, small: float) -> None:
+    """Draw a cell: its picture or words, with the title above and the caption below, in these font sizes."""
     axes.set_title(words(cell.title), fontsize=size, pad=4)
     if cell.pixels is None:
         axes.set_frame_on(bool(cell.words))
@@ -198,7 +199,7 @@ def fill(axes: Axes, cell: Cell, size: float) -> None:
         axes.text(0.5, 0.5, cell.words, family="monospace", fontsize=MEDIUM, **place)
         return
     axes.imshow(np.asarray(cell.pixels), aspect="auto")
-    axes.set_xlabel(words(cell.words), fontsize=SMALL, labelpad=4)
+    axes.set_xlabel(words(cell.words), fontsize=small, labelpad=4)
 
 
 def fill_bar(axes: Axes, scale: Scale) -> None:
