@@ -13,10 +13,8 @@ from typing import TYPE_CHECKING
 
 from texgs.cli.new_labels import (
     KIND_KEYS,
-    are_whole,
     as_labels,
     found_in,
-    look_like_labels,
     with_chosen,
     without_lists,
 )
@@ -113,6 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
 def data_set(config: Config, files: list[Path], keys: list[str], arguments: argparse.Namespace) -> Dataset:
     """Read as much of a volume as memory has room for, and return its data set with TFs."""
     from texgs.edit.series import moments_of
+    from texgs.volume.label_choice import has_few_values, holds_labels
 
     volume = config.dataset.volume
     field = array_of(volume)
@@ -127,9 +126,9 @@ def data_set(config: Config, files: list[Path], keys: list[str], arguments: argp
         config = with_room(config, field, len(channels), len(arguments.labels or found))
     config = replace(config, dataset=with_chosen(config.dataset, found, arguments.labels, len(channels)))
     known = read_volume(config, channels)
-    if len(channels) == 1 and KIND_KEYS.isdisjoint(keys) and look_like_labels(known[""]):
+    if len(channels) == 1 and KIND_KEYS.isdisjoint(keys) and has_few_values(known[""]):
         output = Path(config.results, config.dataset.name, "volume")
-        if not (files or arguments.tf or arguments.count) and are_whole(output / "volume.nrrd"):
+        if not (files or arguments.tf or arguments.count) and holds_labels(output / "volume.nrrd"):
             rmtree(output)  # of the same samples as values
             return data_set(as_labels(config), files, keys, arguments)
         sys.stderr.write(

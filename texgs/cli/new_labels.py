@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import sys
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import yaml
 
 from texgs.core.errors import ArgumentError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from texgs.config.dataset import Dataset
     from texgs.config.schema import Config
     from texgs.volume.label_names import Label
@@ -42,26 +39,6 @@ def as_labels(config: Config) -> Config:
     dataset = config.dataset
     sys.stderr.write(f"{dataset.name}: samples are taken for labels; kind=image reads them as values\n")
     return replace(config, dataset=replace(dataset, volume=replace(dataset.volume, kind="labels")))
-
-
-def look_like_labels(summary: Mapping[str, Any]) -> bool:
-    """Return whether samples of a volume have as few values as labels have."""
-    import numpy as np
-
-    from texgs.volume.suggest import looks_like_labels
-
-    extent = summary["maximum"] - summary["minimum"]
-    return not summary.get("robust") and looks_like_labels(np.array(summary["histogram"]), extent)
-
-
-def are_whole(volume: Path) -> bool:
-    """Return whether samples of a prepared volume are whole numbers, of any type."""
-    from texgs.volume.label_masks import label_counts
-    from texgs.volume.nrrd_file import open_prepared
-
-    with suppress(ArgumentError):
-        return bool(label_counts(open_prepared(volume)[0]))
-    return False
 
 
 def found_in(dataset: Dataset, table: Path | None, channel: str | None) -> list[Label]:

@@ -1,12 +1,32 @@
 """Which labels a volume has, and which of them are shown."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.volume.label_masks import label_counts
 from texgs.volume.label_names import Label, label_of
+from texgs.volume.nrrd_file import open_prepared
 from texgs.volume.prepare import bounds_of
 from texgs.volume.slabs import Source
+from texgs.volume.suggest import looks_like_labels
+
+
+def has_few_values(summary: Mapping[str, Any]) -> bool:
+    """Return whether samples of a volume have as few values as labels have, by its summary."""
+    extent = summary["maximum"] - summary["minimum"]
+    return not summary.get("robust") and looks_like_labels(np.array(summary["histogram"]), extent)
+
+
+def holds_labels(volume: Path) -> bool:
+    """Return whether samples of a prepared volume are whole numbers, of any type, and not all 0."""
+    with suppress(ArgumentError):
+        return bool(label_counts(open_prepared(volume)[0]))
+    return False
 
 
 def labels_in(
