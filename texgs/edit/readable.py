@@ -1,4 +1,4 @@
-"""Changes of a new look besides textures: opacity, so that a person can read it, and highlights.
+"""What keeps a new look readable: opacity, so that its pattern shows, hue, so that a legend holds; highlights.
 
 In a translucent part, a pixel shows several layers, whose colours average to grey. More opacity brings out
 the front layer, but also hides the inside, of which enough has to stay visible.
@@ -37,14 +37,21 @@ CHANNELS = 32  # channels to rasterize at once
 
 
 @dataclass(frozen=True)
-class OpacityKeys(MethodKeys):
-    """How opaque parts become with their new look."""
+class ReadableKeys(MethodKeys):
+    """How opaque parts become with their new look, and how far it leaves their hues."""
 
     opacity: str | None = key(
         None,
         "factor on the opacity of the parts, an edit of the scene that can be taken back: keep; a number; or "
         "auto, as much as makes a pattern readable and leaves visible what is inside; default auto, keep in "
         "recipe paper",
+    )
+    hue: float = key(
+        1.0,
+        "how far the look may leave the hues of the functions it lies on, which a legend shows: from 0, not at "
+        "all, to 1, any hue; lightness and texture are free",
+        least=0,
+        most=1,
     )
 
     def check(self) -> None:

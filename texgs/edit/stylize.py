@@ -1,7 +1,7 @@
 """Image-driven editing: the texels of a basic model take on the style of a picture; nothing else changes."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import torch
@@ -11,6 +11,7 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.edit.canvas import mean_alpha, paint, require_editable
+from texgs.edit.hue import HueBound
 from texgs.edit.objective import FeatureTerm, Objective
 from texgs.edit.recipe import DEFAULT, Recipe
 from texgs.edit.steps import model_at_step, where_shown
@@ -41,6 +42,7 @@ def stylize(
     *,
     vgg: Vgg | None = None,
     clip: FeatureTerm | None = None,
+    hue: HueBound | None = None,
     surfels: Tensor | None = None,
     steps: Sequence[Surfels] = (),
     title: str = "style",
@@ -60,6 +62,7 @@ def stylize(
         recipe: how.
         vgg: for NNFM; needed unless the recipe's `features` or `lambda_s` is 0.
         clip: a differentiable loss [] of an image [H, W, 3] in [0, 1], for a `lambda_s` below 1.
+        hue: of the model's function, which the style is moved to; by default it keeps its own.
         surfels: [N] bool, surfels to change; by default all. Others keep texels and colours bit for bit.
         steps: the model at other steps of a series, with the same texels: views show all in turn.
         title: of the progress bar.
@@ -72,7 +75,7 @@ def stylize(
         )
     watch = Stopwatch(model.device)
     with watch.part("start"):
-        run = SurfelPainting(model, cameras, lights, style, recipe, vgg, clip, surfels, steps)
+        run = SurfelPainting(model, cameras, lights, style, recipe, vgg, clip, hue, surfels, steps)
     offer = partial(show, run.result)
     losses = learn_style(run, len(cameras), recipe, title, watch=watch, show=offer)
     return Stylized(run.result(), run.recipe, losses, dict(watch.seconds))
@@ -90,6 +93,7 @@ class SurfelPainting:
         recipe: Recipe,
         vgg: Vgg | None,
         clip: FeatureTerm | None,
+        hue: HueBound | None,
         surfels: Tensor | None,
         steps: Sequence[Surfels] = (),
     ) -> None:
@@ -99,10 +103,13 @@ class SurfelPainting:
         if not recipe.is_textured:
             model = with_single_texels(model, surfels)
         p = model.parameters
-        self.cameras, self.lights, self.recipe, self.surfels = cameras, lights, recipe, surfels
+        self.cameras, self.lights, self.recipe, self.surfels, self.hue = cameras, lights, recipe, surfels, hue
         width, height = cameras[0].width, cameras[0].height
         scaled = style.to(p["means"].device).scaled(recipe.pattern * max(width, height))
         self.style = scaled.vivid(recipe.chroma)  # at its size behind the object
+        if hue is not None:
+            toned = hue.toned(self.style.image.permute(1, 2, 0)).permute(2, 0, 1)
+            self.style = replace(self.style, image=toned.contiguous())
         self.objective = Objective.of(recipe, self.style, recipe.reduction(width, height), vgg, clip)
         colors = -p["palette"].expand_as(p["colors"])
         places, surfel = owners(p)
@@ -157,5 +164,7 @@ class SurfelPainting:
     def result(self) -> Surfels:
         """Return the model with its current texels."""
         texels = self.texels.detach()
+        if self.hue is not None:
+            texels = self.hue.at_texels(texels, self.model)
         colors = texels if self.recipe.is_textured else spread_colors(texels, self.model, self.whole)
         return with_colors(self.whole, colors, self.surfels)

@@ -11,6 +11,7 @@ from torch import Tensor
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.lens import Lens
 from texgs.core.names import part_files
+from texgs.edit.hue import HueBound
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import Method, method_of
 from texgs.fields.field import Field
@@ -95,6 +96,16 @@ class Task(Generic[Settings]):
     def opacity_of(self, part: str) -> float:
         """Return the scene's factor on the opacity of a part; 1 for a part that it fades away."""
         return entry_of(self.scene, part).edit.opacity or 1.0
+
+    def hue_of(self, part: str, surfels: Tensor | None) -> HueBound | None:
+        """Return the bound on the hue of a part's look, of which surfels [N] change; None: any hue."""
+        share: float = self.settings.hue  # type: ignore[attr-defined]
+        if share == 1:
+            return None
+        fitted, _ = replace(
+            self.scene.models[split(self.scene, part)[0]], texture=None, segments={}
+        ).surfels()
+        return HueBound.of(fitted.to(self.device), surfels, share)
 
     def title_of(self, part: str) -> str:
         """Return the title of a progress bar."""

@@ -13,7 +13,15 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.memory import require_memory
 from texgs.edit.canvas import require_editable
-from texgs.edit.observations import LinearObservation, Target, join_views, observe, render_views
+from texgs.edit.hue import HueBound
+from texgs.edit.observations import (
+    LinearObservation,
+    Target,
+    join_views,
+    observe,
+    render_views,
+    straight_colors,
+)
 from texgs.edit.steps import Shot, model_at_step, shots_of
 from texgs.edit.texel_solver import back_project, fill_unseen, learn, seen_texels, solve
 from texgs.fields.optimizer import Rate
@@ -84,6 +92,7 @@ def edit_by_text(
     *,
     light: Light = HEADLIGHT,
     opacity: float = 1.0,
+    hue: HueBound | None = None,
     surfels: Tensor | None = None,
     steps: Sequence[Surfels] = (),
     size: int = SIZE,
@@ -105,6 +114,7 @@ def edit_by_text(
         recipe: which views are edited, and how texels follow.
         light: that shines on the scene while it is edited.
         opacity: factor on the model's opacities, with which it is shown before and after the edit.
+        hue: of the model's function, which edited views are moved to; by default they keep their own.
         surfels: [N] bool, which may change; all by default. Others keep their colours bit for bit.
         steps: the model at other steps of a series, with the same texels: half as many views again show what
             the model hides.
@@ -123,6 +133,8 @@ def edit_by_text(
     shown = [render_views(each.model, each.cameras, shine, opacity) for each in shots]
     views = join_views(shown)
     edited = require_edited(guidance(views, instruction, generator), views, guidance.name)
+    if hue is not None:
+        edited = toned_views(edited, views.alphas, hue)
     own = model if recipe.is_textured else with_single_texels(model, changing)
     opacities = [opacity * x for x in recipe.opacities]
     rows: list[list[LinearObservation]] = [[] for _ in opacities]
@@ -132,9 +144,18 @@ def edit_by_text(
         rows = [[*row, *more] for row, more in zip(rows, observed, strict=True)]
     colors, weights = _follow(rows, own, recipe, generator, title)
     share = _seen_share(weights, own, changing)
+    if hue is not None:
+        colors = hue.at_texels(colors, own)
     colors = colors if recipe.is_textured else spread_colors(colors, own, model)
     changing = changing if recipe.fills else changing & _shown(weights, own)
     return EditedModel(with_colors(model, colors, changing), views, edited, share)
+
+
+def toned_views(images: Tensor, alphas: Tensor, hue: HueBound) -> Tensor:
+    """Return views [V, H, W, 3] over white with colours of a bounded hue; the white stays."""
+    cover = alphas[..., None]
+    straight = torch.stack([straight_colors(*each) for each in zip(images, alphas, strict=True)])
+    return hue.toned(straight) * cover + 1 - cover
 
 
 def _require_memory(shots: Sequence[Shot], recipe: TextRecipe) -> None:

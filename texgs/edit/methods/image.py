@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.keys import key
 from texgs.edit.method import Method
 from texgs.edit.methods.style import StyleKeys, StyleWork
-from texgs.edit.readable import OpacityKeys, raise_opacities
+from texgs.edit.readable import ReadableKeys, raise_opacities
 from texgs.models.catalogue import CLIP_BACKBONES
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class ImageKeys(OpacityKeys, StyleKeys):
+class ImageKeys(ReadableKeys, StyleKeys):
     """How texels take on a style."""
 
     recipe: str = key(
@@ -100,6 +100,7 @@ def run(task: Task[ImageKeys]) -> EditedScene:
             replace(recipe, opacity=task.opacity_of(name)),
             vgg=work.vgg,
             clip=ClipLoss(network, picture.image.permute(1, 2, 0).to(task.device)) if network else None,
+            hue=task.hue_of(name, surfels),
             surfels=surfels,
             steps=task.other_steps(name),
             title=task.title_of(name),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.keys import key
 from texgs.edit.method import Method
 from texgs.edit.methods.instruction import SHOWN_VIEWS, InstructionKeys, write_views
-from texgs.edit.readable import OpacityKeys, highlights_of, raise_opacities
+from texgs.edit.readable import ReadableKeys, highlights_of, raise_opacities
 
 if TYPE_CHECKING:
     import numpy as np
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class TextKeys(OpacityKeys, InstructionKeys):
+class TextKeys(ReadableKeys, InstructionKeys):
     """The instruction, the editor of the views, and how texels follow."""
 
     recipe: str = key(
@@ -75,6 +75,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
             *(guidance, task.settings_for(name).instruction, settings.recipe_of()),
             light=task.scene.light,
             opacity=task.opacity_of(name),
+            hue=task.hue_of(name, surfels),
             surfels=surfels,
             steps=task.other_steps(name),
             size=settings.size,
