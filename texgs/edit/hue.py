@@ -1,10 +1,11 @@
 """How far a look may leave the hue of the function that it lies on, so that a legend still holds.
 
-What a look is learned from, a picture or edited views, is moved to this hue beforehand; lightness and texture
-stay. Hues are chromaticities, see `texgs.core.oklab`: light does not change them.
+What a look is learned from, a picture or edited views, is moved to this hue beforehand, a loss keeps it there,
+and nothing goes farther in the end. Lightness and texture are free. Hues are chromaticities, which light does not
+change, see `texgs.core.oklab`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Self
 
@@ -15,43 +16,67 @@ from texgs.core.oklab import DARKEST, brightness, chromaticity, from_oklab, okla
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import owners
 
+WEIGHT = 30.0  # of the loss
+ALIKE, ALONE = (
+    0.05,
+    0.2,
+)  # distance to the next function: at least, as none can be told then; where there is none
+DARK_TONES = 0.3  # lightness of black in a look with a bound, as black has no hue
 LIGHT_TONES = 0.98  # share of the colours that stay apart when all get darker, as far as a hue requires
 SAMPLES = 1 << 20  # colours, at most, to find by how much
 
 
 @dataclass(frozen=True, eq=False)
 class HueBound:
-    """The hues of a function where its surfels are, and the share of the way from them that a look may go."""
+    """The hues of a function where its surfels are, and how far a look may go from them."""
 
     hues: Tensor  # [N, 2]
     middle: Tensor  # [2] mean of the surfels that take the look
-    share: float  # in [0, 1]
+    reach: float  # distance
 
     @classmethod
-    def of(cls, fitted: Surfels, surfels: Tensor | None, share: float) -> Self:
-        """Read the hues of a model as fitted, of which surfels [N] bool take the look; None: all."""
-        p = fitted.parameters
+    def of(cls, models: Mapping[str, Surfels], name: str, surfels: Tensor | None, share: float) -> Self:
+        """Let a look on surfels [N] bool of a model, by default all, go a share of the way to the next function.
+
+        Models are as fitted, by name; the next function is that of the most similar palette.
+        """
+        p = models[name].parameters
         hues = chromaticity((p["colors"] + p["palette"]).clamp(0, 1))
-        return cls(hues, (hues if surfels is None else hues[surfels]).mean(0), share)
+        middle = (hues if surfels is None else hues[surfels]).mean(0)
+        others = [chromaticity(each.parameters["palette"]) for key, each in models.items() if key != name]
+        apart = min((float((middle - other).norm()) for other in others), default=ALONE)
+        return cls(hues, middle, share * max(apart, ALIKE))
 
     def toned(self, colors: Tensor) -> Tensor:
-        """Move colours [..., 3] in [0, 1] to the mean hue, except for a share of the way.
+        """Move colours [..., 3] in [0, 1] as near to the mean hue as they have to be.
 
         All get darker alike where light ones cannot be shown in this hue: they would no longer differ.
         """
-        moved = moved_hues(colors, lambda own: torch.lerp(self.middle.expand_as(own), own, self.share))
+        moved = moved_hues(colors, lambda own: self.middle + self._within(own - self.middle))
+        lightness = moved[..., :1].clamp_min(DARKEST)
+        moved = moved * (DARK_TONES / lightness + 1 - DARK_TONES)
         bright = brightness(moved).flatten()
         bright = bright[:: -(-len(bright) // SAMPLES)].quantile(LIGHT_TONES).clamp_min(1)
         return from_oklab(moved * bright ** (-1 / 3))
 
+    def loss(self, image: Tensor) -> dict[str, Tensor]:
+        """Return the mean square [] of how much pixels [3, h, w] go too far, weighted; differentiable in them."""
+        away = chromaticity(image.permute(1, 2, 0)) - self.middle
+        excess = (away.square().sum(-1).clamp_min(self.reach**2).sqrt() - self.reach).square()
+        return {"hue": WEIGHT * excess.mean()}
+
     def at_texels(self, colors: Tensor, model: Surfels) -> Tensor:
-        """Return colours [T, 3] of a model's texels, for the mean hue, moved as the hue of each surfel differs."""
+        """Return colours [T, 3] of texels that were learned for the mean hue, around the hue of each surfel."""
         place, surfel = owners(model.parameters)
-        steps = torch.zeros_like(colors[:, :2]).index_copy_(0, place, (self.hues - self.middle)[surfel])
-        return from_oklab(moved_hues(colors, lambda own: own + steps))
+        own = torch.zeros_like(colors[:, :2]).index_copy_(0, place, self.hues[surfel])
+        return from_oklab(moved_hues(colors, lambda seen: own + self._within(seen - self.middle)))
+
+    def _within(self, steps: Tensor) -> Tensor:
+        """Shorten steps [..., 2] to the reach."""
+        return steps * (self.reach / steps.norm(dim=-1, keepdim=True).clamp_min(1e-6)).clamp_max(1)
 
 
 def moved_hues(colors: Tensor, move: Callable[[Tensor], Tensor]) -> Tensor:
-    """Return OKLab [..., 3] of colours [..., 3] in [0, 1] with a function of their chromaticities [..., 2]."""
+    """Return OKLab [..., 3] of colours [..., 3] in [0, 1] with a function of their hues [..., 2]."""
     lightness = oklab(colors)[..., :1]
     return torch.cat([lightness, lightness.clamp_min(DARKEST) * move(chromaticity(colors))], dim=-1)

@@ -1,4 +1,4 @@
-"""What keeps a new look readable: opacity, so that its pattern shows, hue, so that a legend holds; highlights.
+"""What keeps a new look readable: opacity shows its pattern, hue lets a legend hold; and its highlights.
 
 In a translucent part, a pixel shows several layers, whose colours average to grey. More opacity brings out
 the front layer, but also hides the inside, of which enough has to stay visible.
@@ -48,8 +48,8 @@ class ReadableKeys(MethodKeys):
     )
     hue: float = key(
         1.0,
-        "how far the look may leave the hues of the functions it lies on, which a legend shows: from 0, not at "
-        "all, to 1, any hue; lightness and texture are free",
+        "how far a look may leave the hue of the function that it lies on, as a share of the way to the most "
+        "similar function: 0 keeps it, 1 leaves it free; lightness and texture are free",
         least=0,
         most=1,
     )

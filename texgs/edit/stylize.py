@@ -141,7 +141,8 @@ class SurfelPainting:
         camera, light = self.cameras[view].to(self.model.device), self.lights[view]
         color, alpha, share = paint(model, self.texels, camera, light, self.recipe, self.surfels)
         image = (color.detach() + (1 - alpha) * self.behind(alpha)).clamp(0, 1).requires_grad_()
-        return [Painting(image, share, self.objective, color.backward)]
+        own = [] if self.hue is None else [self.hue.loss]
+        return [Painting(image, share, self.objective, color.backward, *own)]
 
     def behind(self, alpha: Tensor) -> Tensor:
         """Return the background [3, h, w]: white, or a random crop of the mirrored style."""
