@@ -1,4 +1,4 @@
-"""OKLab, a colour space whose steps look alike (Ottosson 2020, A perceptual color space for image processing)."""
+"""OKLab, a space of colours whose steps look alike (Ottosson 2020, A perceptual color space)."""
 
 import torch
 from torch import Tensor

@@ -1,8 +1,8 @@
 """How far a look may leave the hue of the function that it lies on, so that a legend still holds.
 
-What a look is learned from, a picture or edited views, is moved to this hue beforehand, a loss keeps it there,
-and nothing goes farther in the end. Lightness and texture are free. Hues are chromaticities, which light does not
-change, see `texgs.core.oklab`.
+What a look is learned from, a picture or edited views, is moved to this hue beforehand, a loss keeps it
+there, and nothing goes farther in the end. Lightness and texture are free. Hues are chromaticities, which
+light does not change, see `texgs.core.oklab`.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,10 +17,8 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import owners
 
 WEIGHT = 30.0  # of the loss
-ALIKE, ALONE = (
-    0.05,
-    0.2,
-)  # distance to the next function: at least, as none can be told then; where there is none
+ALIKE = 0.05  # distance of functions that are hardly told by their hues
+ALONE = 0.2  # distance to the next function where there is none
 DARK_TONES = 0.3  # lightness of black in a look with a bound, as black has no hue
 LIGHT_TONES = 0.98  # share of the colours that stay apart when all get darker, as far as a hue requires
 SAMPLES = 1 << 20  # colours, at most, to find by how much
@@ -36,7 +34,7 @@ class HueBound:
 
     @classmethod
     def of(cls, models: Mapping[str, Surfels], name: str, surfels: Tensor | None, share: float) -> Self:
-        """Let a look on surfels [N] bool of a model, by default all, go a share of the way to the next function.
+        """Let a look on some surfels [N] bool of a model, or all, go a share of the way to the next function.
 
         Models are as fitted, by name; the next function is that of the most similar palette.
         """
@@ -60,13 +58,13 @@ class HueBound:
         return from_oklab(moved * bright ** (-1 / 3))
 
     def loss(self, image: Tensor) -> dict[str, Tensor]:
-        """Return the mean square [] of how much pixels [3, h, w] go too far, weighted; differentiable in them."""
+        """Return the weighted mean square [] of how far pixels [3, h, w] are beyond; differentiable in them."""
         away = chromaticity(image.permute(1, 2, 0)) - self.middle
         excess = (away.square().sum(-1).clamp_min(self.reach**2).sqrt() - self.reach).square()
         return {"hue": WEIGHT * excess.mean()}
 
     def at_texels(self, colors: Tensor, model: Surfels) -> Tensor:
-        """Return colours [T, 3] of texels that were learned for the mean hue, around the hue of each surfel."""
+        """Return colours [T, 3] of texels, learned for the mean hue, around the hue of each surfel."""
         place, surfel = owners(model.parameters)
         own = torch.zeros_like(colors[:, :2]).index_copy_(0, place, self.hues[surfel])
         return from_oklab(moved_hues(colors, lambda seen: own + self._within(seen - self.middle)))
