@@ -58,10 +58,10 @@ class HueBound:
         return from_oklab(moved * bright ** (-1 / 3))
 
     def loss(self, image: Tensor) -> dict[str, Tensor]:
-        """Return the weighted mean square [] of how far pixels [3, h, w] are beyond; differentiable in them."""
-        away = chromaticity(image.permute(1, 2, 0)) - self.middle
-        excess = (away.square().sum(-1).clamp_min(self.reach**2).sqrt() - self.reach).square()
-        return {"hue": WEIGHT * excess.mean()}
+        """Return the weighted mean square [] of how far pixels [3, h, w] are beyond; differentiable."""
+        away = (chromaticity(image.permute(1, 2, 0)) - self.middle).square().sum(-1)
+        within = max(self.reach, 1e-4)  # a root has no gradient at 0
+        return {"hue": WEIGHT * (away.clamp_min(within**2).sqrt() - within).square().mean()}
 
     def at_texels(self, colors: Tensor, model: Surfels) -> Tensor:
         """Return colours [T, 3] of texels, learned for the mean hue, around the hue of each surfel."""
