@@ -89,7 +89,10 @@ def run(task: Task[TextKeys]) -> EditedScene:
 
     def highlights(name: str, model: Surfels, surfels: Tensor | None) -> dict[str, Any]:
         followed = task.settings_for(name).instruction
-        return highlights_of(followed, model, surfels) if settings.recipe_of().material else {}
+        values = highlights_of(followed, model, surfels) if settings.recipe_of().material else {}
+        if settings.hue < 1:
+            values.pop("tint", None)  # a tint is a hue
+        return values
 
     scene = task.each_part(one, highlights)
     return EditedScene(
