@@ -45,8 +45,9 @@ def from_oklab(lab: Tensor) -> Tensor:
 
 def _linear(lab: Tensor) -> Tensor:
     """Return linear sRGB [..., 3], also what no screen can show."""
-    cones = (lab @ torch.linalg.inv(lab.new_tensor(LAB)).T) ** 3
-    return cones @ torch.linalg.inv(lab.new_tensor(CONES)).T
+    to_roots, to_rgb = (torch.linalg.inv(lab.new_tensor(each)).T for each in (LAB, CONES))
+    linear: Tensor = (lab @ to_roots) ** 3 @ to_rgb
+    return linear
 
 
 def chromaticity(rgb: Tensor) -> Tensor:
@@ -54,5 +55,5 @@ def chromaticity(rgb: Tensor) -> Tensor:
 
     A light scales the linear colour of a matt surface, and so all three of L, a and b alike.
     """
-    lightness, axes = oklab(rgb).split([1, 2], dim=-1)
-    return axes / lightness.clamp_min(DARKEST)
+    lab = oklab(rgb)
+    return lab[..., 1:] / lab[..., :1].clamp_min(DARKEST)
