@@ -81,6 +81,14 @@ def stylize(
     return Stylized(run.result(), run.recipe, losses, dict(watch.seconds))
 
 
+def learned_style(style: StylePicture, side: int, recipe: Recipe, hue: HueBound | None) -> StylePicture:
+    """Return a style as it is behind views of a longer side, in the colours that are learned from it."""
+    vivid = style.scaled(recipe.pattern * side).vivid(recipe.chroma)
+    if hue is None:
+        return vivid
+    return replace(vivid, image=hue.toned(vivid.image.permute(1, 2, 0)).permute(2, 0, 1).contiguous())
+
+
 class SurfelPainting:
     """Textured surfels that learn a style; see `stylize`."""
 
@@ -105,11 +113,7 @@ class SurfelPainting:
         p = model.parameters
         self.cameras, self.lights, self.recipe, self.surfels, self.hue = cameras, lights, recipe, surfels, hue
         width, height = cameras[0].width, cameras[0].height
-        scaled = style.to(p["means"].device).scaled(recipe.pattern * max(width, height))
-        self.style = scaled.vivid(recipe.chroma)  # at its size behind the object
-        if hue is not None:
-            toned = hue.toned(self.style.image.permute(1, 2, 0)).permute(2, 0, 1)
-            self.style = replace(self.style, image=toned.contiguous())
+        self.style = learned_style(style.to(p["means"].device), max(width, height), recipe, hue)
         self.objective = Objective.of(recipe, self.style, recipe.reduction(width, height), vgg, clip)
         colors = -p["palette"].expand_as(p["colors"])
         places, surfel = owners(p)

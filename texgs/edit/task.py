@@ -8,6 +8,7 @@ from typing import Any, Generic, TypeVar
 import torch
 from torch import Tensor
 
+from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.lens import Lens
 from texgs.core.names import part_files
@@ -20,6 +21,7 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import labels_of, write_texture
 from texgs.scene.parts import NewLook, entry_of, part_names, replace_entry, split, with_looks
 from texgs.scene.scene import Scene
+from texgs.volume.images import smaller
 from texgs.volume.view_set import View, read_views
 
 Settings = TypeVar("Settings")
@@ -118,6 +120,10 @@ class Task(Generic[Settings]):
                 f"got {model}"
             )
         return read_views(self.views[model].parent).train
+
+    def cameras_of(self, views: Sequence[View]) -> list[Camera]:
+        """Return the cameras of views as small as they were for the fit, on the task's device."""
+        return [smaller(view.camera, self.reduce).to(self.device) for view in views]
 
     def other_steps(self, part: str) -> list[Surfels]:
         """Return the model of a part at further steps of its series, so that the look suits all steps."""

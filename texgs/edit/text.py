@@ -133,8 +133,7 @@ def edit_by_text(
     shown = [render_views(each.model, each.cameras, shine, opacity) for each in shots]
     views = join_views(shown)
     edited = require_edited(guidance(views, instruction, generator), views, guidance.name)
-    if hue is not None:
-        edited = toned_views(edited, views.alphas, hue)
+    edited = edited if hue is None else toned_views(edited, views.alphas, hue)
     own = model if recipe.is_textured else with_single_texels(model, changing)
     opacities = [opacity * x for x in recipe.opacities]
     rows: list[list[LinearObservation]] = [[] for _ in opacities]
@@ -142,10 +141,8 @@ def edit_by_text(
         at, learning = model_at_step(own, shot.model), shot.surfels if recipe.target == "colors" else changing
         observed = observe(at, part, images, shine, opacities, learning, target=recipe.target)
         rows = [[*row, *more] for row, more in zip(rows, observed, strict=True)]
-    colors, weights = _follow(rows, own, recipe, generator, title)
+    colors, weights = _follow(rows, own, recipe, hue, generator, title)
     share = _seen_share(weights, own, changing)
-    if hue is not None:
-        colors = hue.at_texels(colors, own)
     colors = colors if recipe.is_textured else spread_colors(colors, own, model)
     changing = changing if recipe.fills else changing & _shown(weights, own)
     return EditedModel(with_colors(model, colors, changing), views, edited, share)
@@ -240,6 +237,7 @@ def _follow(
     rows: list[list[LinearObservation]],
     model: Surfels,
     recipe: TextRecipe,
+    hue: HueBound | None,
     generator: torch.Generator,
     title: str,
 ) -> tuple[Tensor, Tensor]:
@@ -254,6 +252,7 @@ def _follow(
     else:
         start, sweeps = fill_unseen(sums.colors, sums.weights, model), recipe.sweeps
         colors = solve(observations, sums.curvature, start, sweeps=sweeps, generator=generator, title=title)
+    colors = colors if hue is None else hue.at_texels(colors, model)
     if not recipe.fills:
         colors = torch.where(sums.weights[:, None] > 0, colors, bare_colors(model))
     return colors, sums.weights

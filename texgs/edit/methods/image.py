@@ -81,7 +81,6 @@ def run(task: Task[ImageKeys]) -> EditedScene:
     from texgs.edit.task import EditedScene
     from texgs.models.clip import Clip
     from texgs.models.vgg import Vgg
-    from texgs.volume.images import smaller
 
     task = raise_opacities(task)
     keys, recipe = task.settings, task.settings.recipe_of(task.edit.seed)
@@ -94,7 +93,7 @@ def run(task: Task[ImageKeys]) -> EditedScene:
         picture = work.picture(name)
         result = stylize(
             model,
-            [smaller(view.camera, task.reduce) for view in views],
+            task.cameras_of(views),
             [task.scene.light] * len(views),
             picture,
             replace(recipe, opacity=task.opacity_of(name)),

@@ -61,7 +61,6 @@ def run(task: Task[TextKeys]) -> EditedScene:
     """Give the parts the look; write views.png with the edited views."""
     from texgs.edit.task import EditedScene
     from texgs.edit.text import edit_by_text
-    from texgs.volume.images import smaller
 
     task = raise_opacities(task)
     settings, guidance = task.settings, task.settings.opened(task.device)
@@ -71,7 +70,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
     def one(name: str, model: Surfels, surfels: Tensor | None, views: Sequence[View]) -> Surfels:
         result = edit_by_text(
             model,
-            [smaller(view.camera, task.reduce).to(task.device) for view in views],
+            task.cameras_of(views),
             *(guidance, task.settings_for(name).instruction, settings.recipe_of()),
             light=task.scene.light,
             opacity=task.opacity_of(name),
@@ -89,10 +88,8 @@ def run(task: Task[TextKeys]) -> EditedScene:
 
     def highlights(name: str, model: Surfels, surfels: Tensor | None) -> dict[str, Any]:
         followed = task.settings_for(name).instruction
-        values = highlights_of(followed, model, surfels) if settings.recipe_of().material else {}
-        if settings.hue < 1:
-            values.pop("tint", None)  # a tint is a hue
-        return values
+        is_wanted, is_free = settings.recipe_of().material, settings.hue == 1
+        return highlights_of(followed, model, surfels, tinted=is_free) if is_wanted else {}
 
     scene = task.each_part(one, highlights)
     return EditedScene(
