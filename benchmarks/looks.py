@@ -22,17 +22,22 @@ from texgs.core.camera import orbit
 from texgs.core.figures import as_picture, grid_rows, lay_out
 from texgs.edit.methods.style import picture_of
 from texgs.edit.new_look import learn_look, look_task, readable_task, settings_of
+from texgs.metrics.edits import readability
 from texgs.metrics.edits.retrieval import places_among
+from texgs.metrics.metric import MeasuredScene, values_of
 from texgs.metrics.retrieval import LAYERS, Likeness, scene_likeness, style_likeness
 from texgs.models.pictures import PICTURES
 from texgs.models.vgg import Vgg
+from texgs.scene.film import COUNTS
 from texgs.scene.frame import frame
 from texgs.scene.parts import with_looks
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene, write_scene
+from texgs.volume.cameras import spiral
 from tools.style_likeness import picture_likeness
 
 SHOWN = 200  # pixels of a picture in a sheet
+MEASURED, SIZE = 4, 400  # views that are measured, and pixels of their sides
 
 
 def look(scene: Scene, style: str, changes: str, folder: Path) -> tuple[Scene, float | None]:
@@ -63,6 +68,14 @@ def shown(scene: Scene) -> np.ndarray:
     return frame(scene.open(), orbit(30, 20, *scene.framed().lens().square(SHOWN)), scene)
 
 
+def left_of_data(scene: Scene, made: Scene, file: Path) -> dict[str, float]:
+    """Return what is left of the data in a look, whose file is the third, and before it."""
+    path = spiral(COUNTS["test"], scene.framed().lens().square(SIZE))
+    both, opened = (scene, made), (scene.open(), made.open())
+    measured = MeasuredScene("", both, opened, file, path, MEASURED, ("", ""), "", {}, [])
+    return values_of(measured, [readability.METRIC])
+
+
 def rows_of(name: str, scene: Scene, changes: str, arguments: argparse.Namespace, vgg: Vgg) -> pd.DataFrame:
     """Return a row for each look of a scene by one setting."""
     styles = arguments.styles.split(",")
@@ -78,7 +91,8 @@ def rows_of(name: str, scene: Scene, changes: str, arguments: argparse.Namespace
         looks.append((Path(style).name, values))
         if not (folder / "shown.png").exists():
             Image.fromarray(shown(made)).save(folder / "shown.png")
-        rows.append({"scene": name, "settings": changes, "style": Path(style).name, "seconds": seconds})
+        row = {"scene": name, "settings": changes, "style": Path(style).name, "seconds": seconds}
+        rows.append({**row, **left_of_data(scene, made, folder / "scene.yaml")})
         print(name, changes, style, seconds, flush=True)
     places = places_among(looks)
     return pd.DataFrame([{**row, **place} for row, place in zip(rows, places, strict=True)])

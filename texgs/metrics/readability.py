@@ -1,0 +1,83 @@
+"""What is left of the data in pictures: which function a pixel shows, and to which side they get lighter."""
+
+from dataclasses import replace
+
+import torch
+from torch import Tensor
+
+from texgs.core.oklab import chromaticity, oklab
+from texgs.fields.surfels.composition import Composition
+from texgs.metrics.metric import MeasuredScene
+from texgs.metrics.retrieval import smoothing
+from texgs.raster import Render
+from texgs.scene.scene import Scene, volume_of
+from texgs.scene.scene_file import read_scene
+from texgs.scene.twin import Twin
+
+OBJECT_ALPHA = 0.5  # alpha above which a pixel shows the object
+EDGE_SIGMA = 1 / 100  # of the Gaussian that smooths lightness, in image sides
+GREY = (0.0, 0.5, 0.5, 0.5)  # colour of all functions where light alone counts
+
+
+def shares_of(measured: MeasuredScene, at: int, names: list[str]) -> list[Tensor]:
+    """Return the share [H, W, M] of each named model in each measured view, by surfels.
+
+    A scene of another field has those of its geometry with the same edits; [] if these are no surfels.
+    """
+    scene, shown = measured.scenes[at], measured.compositions[at]
+    if not isinstance(shown, Composition):
+        fitted = read_scene(measured.geometry_file).models
+        scene = Scene({name: replace(each, edit=scene.models[name].edit) for name, each in fitted.items()})
+        shown = scene.open(shown.device)
+    if not isinstance(shown, Composition):
+        return []
+    counts = torch.tensor([len(part.model) for part in shown.parts])
+    marks = torch.tensor([[name == model for name in names] for model in scene.models])
+    marks = marks.repeat_interleave(counts, dim=0).to(shown.means)
+    return [shown.shares(camera, scene.edits, marks) for camera in measured.some]
+
+
+def under_light_alone(measured: MeasuredScene, at: int) -> list[Render]:
+    """Render the volume of a scene with its light and opacities over white, all functions in one grey."""
+    scene, shown = measured.scenes[at], measured.compositions[at]
+    models = {n: replace(each, edit=replace(each.edit, palette=None)) for n, each in scene.models.items()}
+    grey = {n: tf.with_points(tf.opacity, (GREY,)) for n, tf in volume_of(scene).tfs.items() if n in models}
+    twin, scene = Twin(scene, shown.device), Scene(models, scene.light.unhidden)
+    return [twin.render(camera, scene, shown.palettes, functions=grey) for camera in measured.some]
+
+
+def told_by_hue(seen: Render, shares: Tensor, legend: list[Tensor]) -> Tensor:
+    """Return whether hue tells the function with the largest share [H, W, M] of each object pixel [n] bool.
+
+    It tells the one with the nearest chromaticity among its colours [K, 3] in the legend.
+    """
+    where = (seen.alpha > OBJECT_ALPHA) & (shares.sum(-1) > OBJECT_ALPHA)
+    own = chromaticity(straight(seen)[where])
+    far = [torch.cdist(own, chromaticity(colors.to(own))).amin(dim=1) for colors in legend]
+    return torch.stack(far, dim=1).argmin(dim=1) == shares[where].argmax(dim=1)
+
+
+def keeps_order(seen: Render, reference: Render) -> Tensor:
+    """Return whether lightness rises to the same side as in a reference at each edge [n] bool.
+
+    Edges are the half of the object where the reference changes most. By chance half are true.
+    """
+    where = (seen.alpha > OBJECT_ALPHA) & (reference.alpha > OBJECT_ALPHA)
+    ours, theirs = (slopes(each)[:, where] for each in (seen, reference))
+    strength = theirs.norm(dim=0)
+    return (ours * theirs).sum(dim=0)[strength >= strength.median()] > 0
+
+
+def slopes(seen: Render) -> Tensor:
+    """Return the slopes [2, H, W] of an object's smoothed lightness; the white behind it does not count."""
+    sigma = EDGE_SIGMA * max(seen.alpha.shape)
+    down, along = (smoothing(size, sigma).to(seen.alpha) for size in seen.alpha.shape)
+    planes = torch.stack([oklab(straight(seen))[..., 0] * seen.alpha, seen.alpha])
+    lightness, share = down @ planes @ along
+    return torch.stack(torch.gradient(lightness / share.clamp_min(1e-6)))
+
+
+def straight(seen: Render) -> Tensor:
+    """Return the colours [H, W, 3] in [0, 1] of a picture over white without the white behind."""
+    alpha = seen.alpha[..., None]
+    return ((seen.color - (1 - alpha)) / alpha.clamp_min(1e-6)).clamp(0, 1)
