@@ -1,9 +1,10 @@
 """Looks of scenes: whether their picture can be named, and what they leave of the data.
 
-`python -m benchmarks.looks FOLDER SCENE... --styles glass,...,FILE --set hue=0.3 --set pattern=0.7` gives each
-scene, a file `NAME=scene.yaml`, each picture by each setting of `edit.image`, and writes FOLDER/looks.csv and
-a sheet of pictures a setting. Looks stay in the folder, and a run goes on where it stopped. Pictures are
-those of texgs and the files named, among which the place of each is found. It needs VGG-16.
+`python -m benchmarks.looks FOLDER NAME=SCENE... --styles glass,...,FILE --set hue=0.3 --set pattern=0.7` gives
+each scene each picture by each setting of `edit.image`, and writes FOLDER/looks.csv and a sheet a setting.
+Looks stay in the folder, and a run goes on where it stopped. Pictures are those of texgs and files named there,
+among which the place of each is found. `told_of_all` counts all object pixels alike, also those in which
+several functions show. It needs VGG-16.
 """
 
 from __future__ import annotations
@@ -22,31 +23,39 @@ from texgs.core.camera import orbit
 from texgs.core.figures import as_picture, grid_rows, lay_out
 from texgs.edit.methods.style import picture_of
 from texgs.edit.new_look import learn_look, look_task, readable_task, settings_of
+from texgs.metrics.edits.readability import METRIC
 from texgs.metrics.edits.retrieval import places_among
+from texgs.metrics.metric import MeasuredScene, values_of
+from texgs.metrics.readability import legend_colors, shares_of, told_by_hue
 from texgs.metrics.retrieval import LAYERS, Likeness, scene_likeness, style_likeness
 from texgs.models.pictures import PICTURES
 from texgs.models.vgg import Vgg
+from texgs.scene.film import COUNTS
 from texgs.scene.frame import frame
 from texgs.scene.parts import with_looks
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene, write_scene
+from texgs.volume.cameras import spiral
 from tools.style_likeness import picture_likeness
 
 SHOWN = 200  # pixels of a picture in a sheet
+MEASURED, SIZE = 4, 400  # views that are measured, and pixels of their sides
 
 
-def look(scene: Scene, style: str, changes: str, folder: Path) -> tuple[Scene, float | None]:
-    """Return a scene in a style, and the seconds of processor time that took, None where it was there."""
-    file = folder / "scene.yaml"
-    if file.exists():
-        return read_scene(file), None
+def look(scene: Scene, style: str, changes: str, folder: Path) -> tuple[Scene, float]:
+    """Return a scene in a style, and the seconds of processor time that it took."""
+    file, time = folder / "scene.yaml", folder / "seconds.txt"
+    if time.exists():
+        return read_scene(file), float(time.read_text())
     values: dict[str, Any] = dict(pair.split("=") for pair in changes.split(",") if pair)
     values = {key: float(x) if x.replace(".", "").isdigit() else x for key, x in values.items()}
     settings, start = settings_of("image", {**values, "style": style}), process_time()
     task = readable_task(look_task(scene, settings, [], folder / "files", torch.device("cpu")))
     made = with_looks(task.scene, learn_look(task).looks)
+    seconds = process_time() - start
     write_scene(file, made)
-    return made, process_time() - start
+    time.write_text(f"{seconds:.1f}")
+    return made, seconds
 
 
 def gallery(styles: list[str], vgg: Vgg) -> tuple[list[str], Likeness]:
@@ -61,6 +70,18 @@ def gallery(styles: list[str], vgg: Vgg) -> tuple[list[str], Likeness]:
 def shown(scene: Scene) -> np.ndarray:
     """Return a small picture of a scene."""
     return frame(scene.open(), orbit(30, 20, *scene.framed().lens().square(SHOWN)), scene)
+
+
+def left_of_data(scene: Scene, made: Scene, file: Path) -> dict[str, float]:
+    """Return what is left of the data in a look, whose file is the third, and before it."""
+    path = spiral(COUNTS["test"], scene.framed().lens().square(SIZE))
+    both, opened = (scene, made), (scene.open(), made.open())
+    measured = MeasuredScene("", both, opened, file, path, MEASURED, ("", ""), "", {}, [])
+    legend, views = legend_colors(measured), [measured.frame(place) for place in measured.places]
+    shares = shares_of(measured, 1, [*legend])
+    told = [told_by_hue(*each, [*legend.values()], 0.0) for each in zip(views, shares, strict=True)]
+    shown, seen = map(torch.cat, zip(*told, strict=True))
+    return {"told_of_all": float((shown == seen).float().mean()), **values_of(measured, [METRIC])}
 
 
 def rows_of(name: str, scene: Scene, changes: str, arguments: argparse.Namespace, vgg: Vgg) -> pd.DataFrame:
@@ -78,7 +99,8 @@ def rows_of(name: str, scene: Scene, changes: str, arguments: argparse.Namespace
         looks.append((Path(style).name, values))
         if not (folder / "shown.png").exists():
             Image.fromarray(shown(made)).save(folder / "shown.png")
-        rows.append({"scene": name, "settings": changes, "style": Path(style).name, "seconds": seconds})
+        row = {"scene": name, "settings": changes, "style": Path(style).name, "seconds": seconds}
+        rows.append({**row, **left_of_data(scene, made, folder / "scene.yaml")})
         print(name, changes, style, seconds, flush=True)
     places = places_among(looks)
     return pd.DataFrame([{**row, **place} for row, place in zip(rows, places, strict=True)])

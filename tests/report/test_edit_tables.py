@@ -161,7 +161,7 @@ def test_what_was_not_measured_says_so_and_why(tmp_path):
     text = table.markdown()
     assert "CLIP not measured: the weights of x are not on this machine." in text
     line = next(line for line in text.splitlines() if "| gold |" in line)
-    assert line.count("not measured") == 10, "CLIP, style, consistency and places"
+    assert line.count("not measured") == 14, "CLIP, style, consistency, places and readability"
     assert rows(table)[-1]["geometry kept"] is None, "the segment was not measured"
 
 

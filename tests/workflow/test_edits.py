@@ -86,6 +86,17 @@ def test_an_edit_reads_the_scene_of_its_base():
     refused(lambda: STAGES["edit_text"].inputs(of_tf), "leave out tf=TF01", ConfigError)
 
 
+def test_measures_of_a_look_read_the_volume_of_its_scene_if_it_has_one(tmp_path):
+    """For the order of depth."""
+    files = STAGES["edit_metrics"].inputs(compose(("dataset=engine", "edit=glass")))
+    assert files["volume"].parts[-3:] == ("engine", "volume", "volume.nrrd")
+    assert "volume" not in STAGES["edit_image"].inputs(compose(("dataset=engine", "edit=glass")))
+    (views := tmp_path / "vortex" / "TF01" / "transforms_train.json").parent.mkdir(parents=True)
+    views.touch()
+    of_views = compose(("dataset=vortex", "edit=glass", f"data_folder={tmp_path}"))
+    assert "volume" not in STAGES["edit_metrics"].inputs(of_views)
+
+
 FITS = {
     "arf": "plenoxels_quick",
     **dict.fromkeys(("igs2gs", "dge"), "gaussians_quick"),

@@ -33,7 +33,6 @@ KEPT_SHARE = 0.5  # share of its pixels that every part must keep
 SHOWN_SHARE = 0.1  # share of a pixel's colour above which it shows a part
 VIEWS, SIZE = 6, 100  # number of views to measure visibility, and pixels of their sides
 BISECTIONS = 5  # halvings of the interval of a share
-CHANNELS = 32  # channels to rasterize at once
 
 
 @dataclass(frozen=True)
@@ -165,26 +164,8 @@ class PartVisibility:
         return torch.stack([(each > SHOWN_SHARE).sum(dim=(0, 1)) for each in self.shares(edits)]).sum(0)
 
     def shares(self, edits: Mapping[str, PartEdit]) -> Iterator[Tensor]:
-        """Yield the share [H, W, P] of each part in each pixel, view by view."""
-        import torch
-
-        from texgs.fields.surfels.composition import by_part
-        from texgs.raster import rasterize
-
-        composed = self.composed
-        edited = zip(composed.parts, by_part(composed.parts, [*edits.values()]), strict=True)
-        splats = composed.means, composed.quats, composed.scales
-        opacities = torch.cat([part.opacity(own) for part, own in edited])
-        for camera in self.cameras:
-            planes = [
-                rasterize(
-                    *(*splats, opacities, camera.viewmat, camera.K, camera.width, camera.height),
-                    features=marks.contiguous(),
-                    options=composed.options,
-                ).color
-                for marks in self.marks.split(CHANNELS, dim=1)
-            ]
-            yield torch.cat(planes, dim=-1)
+        """Return the share [H, W, P] of each part in each pixel, view by view."""
+        return (self.composed.shares(camera, [*edits.values()], self.marks) for camera in self.cameras)
 
 
 def largest(holds: Callable[[float], bool]) -> float:

@@ -24,6 +24,7 @@ from texgs.fields.surfels.variants import labels_of
 from texgs.raster import Render, Texture, rasterize
 from texgs.raster.shading import MATERIAL
 
+CHANNELS = 32  # channels of marks to rasterize at once
 DISC_OPACITY = 1e6  # opacity that makes a surfel a disc with a sharp rim
 DISC_SCALE = 1 / sqrt(
     2 * log(DISC_OPACITY / 0.5)
@@ -172,6 +173,18 @@ class Composition(Composed):
             return render
         normals = torch.cat([seen_normals(part.model.parameters, camera) for part in self.parts])
         return replace(render, normal=draw(features=normals).color)
+
+    def shares(self, camera: Camera, edits: Sequence[PartEdit] | None, marks: Tensor) -> Tensor:
+        """Return the share [H, W, M] of each group of surfels, marked by 1 [N, M], in each pixel's colour."""
+        pairs = zip(self.parts, by_part(self.parts, edits), strict=True)
+        opacities = torch.cat([part.opacity(own) for part, own in pairs])
+        splats = self.means, self.quats, self.scales, opacities
+        view = camera.viewmat, camera.K, camera.width, camera.height
+        planes = [
+            rasterize(*splats, *view, features=some.contiguous(), options=self.options).color
+            for some in marks.split(CHANNELS, dim=1)
+        ]
+        return torch.cat(planes, dim=-1)
 
     @cached_property
     def normals(self) -> Tensor:

@@ -10,7 +10,7 @@ from texgs.edit.method import method_of, methods
 from texgs.report.results import EditMeasures
 from texgs.volume.view_settings import ViewKeys
 from texgs.workflow.edits import edited_scene
-from texgs.workflow.inputs import fitted_scene, view_settings, with_recipe
+from texgs.workflow.inputs import fitted_scene, models_and_volume, view_settings, with_recipe
 from texgs.workflow.stage import ALL_THREADS, Config, Outcome, Rule, Stage, read, result_file
 from texgs.workflow.stages.settings import OfEdit
 
@@ -31,7 +31,7 @@ class Settings(OfEdit):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Measure; nothing but the numbers is written.
 
-    It reads `scene`, edited, `before`, as fitted, and `geometry`, the scene whose depth is taken.
+    It reads `scene`, edited, `before`, as fitted, with its volume, and `geometry`, whose depth is taken.
     """
     from texgs.core.check import torch_device
     from texgs.metrics.metric import MeasuredScene, values_of
@@ -80,13 +80,14 @@ def styles_of(settings: Settings, scene: Scene, longest: int) -> list[Style]:
 
 
 def inputs(config: Config) -> dict[str, Path]:
-    """Return the scene as edited and as fitted, what says where its surfaces are, and the views of all TFs.
+    """Return the scene as edited and as fitted, its surfaces and its volume, and the views of all TFs.
 
     Where the experiment has several recipes, surfaces are those of its first, for all edits alike.
     """
     first = with_recipe(config, config.fits[0]) if config.fits else config
     scenes = {"scene": result_file("edit", config), "before": fitted_scene(config)}
-    return {**edited_scene(config), **scenes, "geometry": result_file("compose", first)}
+    of_scene = {**edited_scene(config), **models_and_volume(config), **scenes}
+    return {**of_scene, "geometry": result_file("compose", first)}
 
 
 def applies(config: Config) -> bool:
