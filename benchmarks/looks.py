@@ -1,7 +1,7 @@
 """Looks of scenes: whether their picture can be named, and what they leave of the data.
 
 `python -m benchmarks.looks FOLDER NAME=SCENE... --styles glass,...,FILE --set hue=0.3 --set pattern=0.7`
-gives each scene each picture by each setting of `edit.image`, and writes FOLDER/looks.csv and a sheet for each
+gives each scene each picture by each setting of `edit.image`, and writes FOLDER/looks.csv and a sheet a
 setting. Looks stay in the folder, and a run goes on where it stopped. Pictures are those of texgs and files
 that are named, among which the place of each is found. `told_of_all` counts all object pixels alike, also
 those in which several functions show. It needs VGG-16.
