@@ -81,8 +81,8 @@ def looks(records: Iterable[Record[Any]]) -> Table:
         "Minutes of the edit alone; eight frames spread over the test path; NNFM and Gram distance to the "
         "style in views that it was not learned from; the place of its picture among the "
         f"{len(PICTURES)} of texgs, by how near views are to each, less the mean over the scene's looks, two "
-        f"at least: 1 is the nearest. {CONSISTENCY} Told by hue is the share of object pixels whose TF the "
-        "legend tells, depth order that of edges with the same side lighter as in the volume (by chance 0.5)."
+        f"at least: 1 is the nearest. {CONSISTENCY} Told by hue is the share of pixels of one TF that the "
+        "legend tells, mean over TFs; depth order that of edges whose lighter side is that of the volume."
     )
     rows = sorted(rows_of(records), key=lambda row: FOLLOW_ORDER.index(row["kind"]))
     labels = [*LABELS[:4], Column("follows"), Column("lambda_s", 2, "-")]
