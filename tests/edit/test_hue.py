@@ -162,5 +162,13 @@ def test_a_look_on_a_look_keeps_the_hue_of_the_function(tmp_path):
         assert float(away(colors, rgb).quantile(0.99)) < SHADE
 
 
+def test_hues_of_a_model_without_texture_are_refused_and_those_of_others_do_not_count():
+    model = ball()
+    p = {k: x for k, x in model.parameters.items() if k not in ("palette", "texels", "sizes", "offsets")}
+    bare = replace(model, parameters=p)
+    refused(lambda: HueBound.of({"a": bare}, "a", None, 0.5), "stage texture.*shading.*texture first")
+    assert HueBound.of({"a": colored(GREEN), "b": bare}, "a", None, 0.5).reach == pytest.approx(0.5 * ALONE)
+
+
 def test_a_hue_beyond_all_hues_is_refused():
     refused(lambda: settings_of("image", {"hue": 1.5}), "hue.* 1.*1.5")

@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.oklab import DARKEST, brightness, chromaticity, from_oklab, oklab
+from texgs.edit.canvas import require_editable
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import owners
 
@@ -36,13 +37,15 @@ class HueBound:
     def of(cls, models: Mapping[str, Surfels], name: str, surfels: Tensor | None, share: float) -> Self:
         """Let a look on some surfels [N] bool of a model, or all, go a share of the way to the next function.
 
-        Models are as fitted, by name; the next function is that of the most similar palette.
+        Models are as fitted, by name; the next function is that of the most similar palette. Those that are
+        not textured have none.
         """
+        require_editable(models[name], surfels)
         p = models[name].parameters
         hues = chromaticity((p["colors"] + p["palette"]).clamp(0, 1))
         middle = (hues if surfels is None else hues[surfels]).mean(0)
-        others = [chromaticity(each.parameters["palette"]) for key, each in models.items() if key != name]
-        apart = min((float((middle - other).norm()) for other in others), default=ALONE)
+        others = (each.parameters for key, each in models.items() if key != name and each.stage == "texture")
+        apart = min((float((middle - chromaticity(q["palette"])).norm()) for q in others), default=ALONE)
         return cls(hues, middle, share * max(apart, ALIKE))
 
     def toned(self, colors: Tensor) -> Tensor:
