@@ -165,6 +165,8 @@ def test_shares_of_another_field_are_those_of_its_geometry_with_its_edits(files,
     assert share[..., 0].max() == 0
     assert (share[..., 1] - expected[0][..., 1]).min() > -1e-5, "what hid it is hidden"
     assert shares_of(subject(*[tmp_path / "other.yaml"] * 3), 0, ["high", "low"]) == []
+    (share, *_) = shares_of(subject(files["fitted"], tmp_path / "other.yaml", files["alone"]), 1, ["low"])
+    assert share.max() > 0.5, "a geometry that lacks a model"
 
 
 def test_a_volume_shows_light_alone_whatever_its_colours(files, tmp_path):
@@ -178,6 +180,21 @@ def test_a_volume_shows_light_alone_whatever_its_colours(files, tmp_path):
         torch.testing.assert_close(one.color, one.color[..., :1].expand(-1, -1, 3))
         assert one.alpha.max() > 0
     assert {"depth_order", "depth_order_before"} <= values_of(bare, [METRIC]).keys()
+
+
+def test_the_volume_is_that_before_whatever_an_edit_starts_from(files, tmp_path):
+    """Such as a file of a scene that names another volume, or none, and has a model more."""
+    volume = sphere_volume(tmp_path, low=LOW, high=HIGH)
+    given = subject(*[files["fitted"]] * 3)
+    before = replace(given.scenes[0], volume=volume)
+    expected = under_light_alone(replace(given, scenes=(before, before)), 1)
+    more = {"more": given.after.models["high"], **given.after.models}
+    for other in (None, replace(volume, file=tmp_path / "gone.nrrd")):
+        after = replace(given.after, models=more, volume=other)
+        both = given.compositions[0], after.open()
+        measured = replace(given, scenes=(before, after), compositions=both)
+        assert torch.equal(under_light_alone(measured, 1)[0].color, expected[0].color)
+        assert {"depth_order", "depth_order_before"} <= values_of(measured, [METRIC]).keys()
 
 
 def test_a_real_volume_keeps_its_order_in_its_colours_and_loses_it_under_stripes(files, tmp_path):

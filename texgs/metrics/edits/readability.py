@@ -25,7 +25,7 @@ def run(measured: MeasuredScene) -> dict[str, float]:
         told = [told_by_hue(*each, [*legend.values()]) for each in zip(views, shares, strict=False)]
         if any(len(shown) for shown, _ in told):
             values[f"hue_told{end}"] = mean_told(told)
-        references = under_light_alone(measured, at) if measured.scenes[at].volume else [[], fitted][at]
+        references = under_light_alone(measured, at) if before.volume else [[], fitted][at]
         kept = [keeps_order(*each) for each in zip(views, references, strict=False)]
         if any(map(len, kept)):
             values[f"depth_order{end}"] = float(torch.cat(kept).float().mean())
