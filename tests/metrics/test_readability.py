@@ -60,7 +60,7 @@ def test_discs_in_their_own_colours_are_told_and_in_each_others_are_not(opacity)
     assert torch.equal(*(1 - exchanged[0], exchanged[1]))
     shown, one = told_by_hue(*two_discs(ORANGE, ORANGE, opacity), LEGEND)
     assert (one == shown).sum() == DISCS[..., 0].sum()
-    assert mean_told([(shown, one)]) == 0.5, "functions count alike, however large they are"
+    assert mean_told([torch.stack([shown, one])]) == 0.5, "functions count alike, however large they are"
 
 
 @pytest.mark.parametrize("light", [0.8, 0.5, 0.2])

@@ -65,10 +65,8 @@ def under_light_alone(measured: MeasuredScene, at: int) -> list[Render]:
     return [twin.render(camera, bare, palettes, functions=grey) for camera in measured.some]
 
 
-def told_by_hue(
-    seen: Render, shares: Tensor, legend: list[Tensor], least: float = ONE_FUNCTION
-) -> tuple[Tensor, Tensor]:
-    """Return the functions of object pixels [n], and those that hue tells there.
+def told_by_hue(seen: Render, shares: Tensor, legend: list[Tensor], least: float = ONE_FUNCTION) -> Tensor:
+    """Return [2, n] the functions of object pixels, and those that hue tells there.
 
     A pixel shows the function with the largest share [H, W, M] of it, if that is at least so much of all. Hue
     tells the one with the nearest chromaticity among its colours [K, 3] in the legend.
@@ -77,12 +75,12 @@ def told_by_hue(
     where = (seen.alpha > OBJECT_ALPHA) & (total > OBJECT_ALPHA) & (largest >= least * total)
     own = chromaticity(straight(seen)[where])
     far = [torch.cdist(own, chromaticity(colors.to(own))).amin(dim=1) for colors in legend]
-    return shares[where].argmax(dim=1), torch.stack(far, dim=1).argmin(dim=1)
+    return torch.stack([shares[where].argmax(dim=1), torch.stack(far, dim=1).argmin(dim=1)])
 
 
-def mean_told(views: Sequence[tuple[Tensor, Tensor]]) -> float:
+def mean_told(views: Sequence[Tensor]) -> float:
     """Return the share of each function's pixels that are told in all views, mean over the functions."""
-    shown, told = map(torch.cat, zip(*views, strict=True))
+    shown, told = torch.cat([*views], dim=1)
     return fmean(float((told[shown == each] == each).float().mean()) for each in shown.unique())
 
 
