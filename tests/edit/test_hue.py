@@ -13,12 +13,14 @@ from tests.refusals import refused
 from texgs.core.oklab import chromaticity, oklab
 from texgs.edit.hue import ALIKE, ALONE, HueBound
 from texgs.edit.methods.image import ImageKeys, run
+from texgs.edit.methods.text import METHOD, TextKeys
 from texgs.edit.new_look import settings_of
 from texgs.edit.recipe import preset
 from texgs.edit.style_picture import StylePicture
-from texgs.edit.stylize import stylize
+from texgs.edit.stylize import learned_style, stylize
 from texgs.edit.task import Task
 from texgs.edit.text import RECIPES, edit_by_text
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.texels import bare_colors, owners
 from texgs.models.pictures import picture
@@ -63,6 +65,13 @@ def test_colours_are_within_reach_and_as_light_in_order(rgb, share, seed):
     assert float(after[is_shown][before[is_shown].argsort()].diff().min()) > -2e-3
 
 
+def test_tones_differ_however_dark_this_hue_is_and_black_has_a_hue():
+    greys = torch.linspace(0, 1, 500)[:, None].expand(-1, 3)
+    tones = oklab(bound(0.0, (0.1, 0.1, 0.8)).toned(greys))[:, 0]
+    assert float(tones[:480].diff().min()) > 1e-5
+    assert tones[0] > 0.05
+
+
 def test_the_reach_is_a_share_of_the_way_to_the_most_similar_function():
     far = float(away(torch.tensor(CREAM), GREEN))
     assert bound(0.3).reach == pytest.approx(0.3 * far, rel=1e-4)
@@ -101,6 +110,11 @@ def test_each_surfel_keeps_its_own_hue():
     greys = torch.linspace(0.2, 0.6, len(place))[:, None].expand(-1, 3)
     found = chromaticity(hue.at_texels(greys, model)[place])
     assert float((found - hue.hues[surfel]).norm(dim=1).max()) < 1e-3
+    of_half = HueBound.of({"a": model}, "a", half, 0.0)
+    torch.testing.assert_close(of_half.middle, hue.hues[half][0])
+    made = edit_by_text(model, views()[0], Tint((0.5, 0.5, 0.5)), "x", RECIPES["quick"], hue=hue, size=96)
+    found = chromaticity(bare_colors(made.model).clamp(0, 1)[place])
+    assert float((found - hue.hues[surfel]).norm(dim=1).quantile(0.99)) < SHADE, "also by words"
 
 
 @pytest.mark.parametrize("recipe", ["preview", "patches"])
@@ -108,9 +122,13 @@ def test_a_look_by_a_picture_keeps_the_hue_that_it_lies_on(recipe):
     model, style = colored(GREEN), StylePicture.of(picture("glass", 96))
     recipe = preset(recipe, **({"iterations": 8} if recipe == "patches" else {}))
     free = stylize(model, *views(), style, recipe).model
+    kept = learned_style(style, 64, recipe, bound(0.1)).image.permute(1, 2, 0)
+    assert float(away(kept, GREEN).max()) < bound(0.1).reach + SHADE
     for share in (0.0, 0.3):
         hue = HueBound.of({"a": model, "b": colored(CREAM)}, "a", None, share)
-        kept = stylize(model, *views(), style, recipe, hue=hue).model
+        done = stylize(model, *views(), style, recipe, hue=hue)
+        assert ("hue" in done.losses) == (recipe.iterations > 0), "a loss keeps it, too"
+        kept = done.model
         colors = bare_colors(kept).clamp(0, 1)
         assert float(away(colors, GREEN).quantile(0.99)) < hue.reach + SHADE
         lightness = oklab(colors)[:, 0]
@@ -138,6 +156,8 @@ def test_a_look_by_words_keeps_the_hue_that_it_lies_on():
     red = edit_by_text(model, cameras, Tint((0.9, 0.1, 0.1)), "x", RECIPES["quick"], size=96)
     kept = edit_by_text(model, cameras, Tint((0.9, 0.1, 0.1)), "x", RECIPES["quick"], hue=hue, size=96)
     assert float(away(bare_colors(red.model).clamp(0, 1), GREEN).median()) > 0.2
+    seen = kept.images[kept.views.alphas > 0.99]
+    assert float(away(seen, GREEN).quantile(0.99)) < hue.reach + SHADE, "texels learn from it"
     assert float(away(bare_colors(kept.model).clamp(0, 1), GREEN).quantile(0.99)) < hue.reach + SHADE
 
 
@@ -160,6 +180,27 @@ def test_a_look_on_a_look_keeps_the_hue_of_the_function(tmp_path):
     for name, rgb in (("a", GREEN), ("b", CREAM)):
         colors = bare_colors(scene.models[name].surfels()[0]).clamp(0, 1)
         assert float(away(colors, rgb).quantile(0.99)) < SHADE
+
+
+def test_gold_by_words_has_the_hue_of_the_function_and_white_highlights(tmp_path):
+    scene = Scene({"a": SceneModel(write_model(tmp_path / "a", colored(GREEN)))})
+    for share in (0.0, 1.0):
+        keys = TextKeys(instruction="make it gold", guidance="filters", size=64, opacity="keep", hue=share)
+        given = vars(task(scene, tmp_path / str(share))) | {"settings": keys, "draws": False}
+        (tmp_path / str(share)).mkdir()
+        entry = METHOD.run(SeenFromAround(**given)).scene.models["a"]
+        assert (entry.edit.tint == PartEdit.tint) == (share == 0)
+        assert entry.edit.specular != 1, "a part of the material that has no hue"
+        far = float(away(bare_colors(entry.surfels()[0]).clamp(0, 1), GREEN).quantile(0.99))
+        assert (far < SHADE) == (share == 0)
+
+
+def test_hues_of_a_model_without_texture_are_refused_and_those_of_others_do_not_count():
+    model = ball()
+    p = {k: x for k, x in model.parameters.items() if k not in ("palette", "texels", "sizes", "offsets")}
+    bare = replace(model, parameters=p)
+    refused(lambda: HueBound.of({"a": bare}, "a", None, 0.5), "stage texture.*shading.*texture first")
+    assert HueBound.of({"a": colored(GREEN), "b": bare}, "a", None, 0.5).reach == pytest.approx(0.5 * ALONE)
 
 
 def test_a_hue_beyond_all_hues_is_refused():

@@ -17,9 +17,16 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.metrics.edits.readability import METRIC
 from texgs.metrics.metric import values_of
-from texgs.metrics.readability import keeps_order, mean_told, shares_of, told_by_hue, under_light_alone
+from texgs.metrics.readability import (
+    keeps_order,
+    legend_colors,
+    mean_told,
+    shares_of,
+    told_by_hue,
+    under_light_alone,
+)
 from texgs.raster import Render
-from texgs.scene.scene import Scene, SceneModel, SceneVolume
+from texgs.scene.scene import Scene, SceneModel, SceneSegment, SceneVolume
 from texgs.scene.scene_file import write_scene
 from texgs.scene.twin import Twin
 from texgs.volume.nrrd_file import open_grid
@@ -60,7 +67,7 @@ def test_discs_in_their_own_colours_are_told_and_in_each_others_are_not(opacity)
     assert torch.equal(*(1 - exchanged[0], exchanged[1]))
     shown, one = told_by_hue(*two_discs(ORANGE, ORANGE, opacity), LEGEND)
     assert (one == shown).sum() == DISCS[..., 0].sum()
-    assert mean_told([(shown, one)]) == 0.5, "functions count alike, however large they are"
+    assert mean_told([torch.stack([shown, one])]) == 0.5, "functions count alike, however large they are"
 
 
 @pytest.mark.parametrize("light", [0.8, 0.5, 0.2])
@@ -152,6 +159,16 @@ def test_a_scene_is_measured_beside_the_one_before(files):
     assert alone == {"depth_order": 1.0}, "one function has nothing to tell"
 
 
+def test_colours_of_segments_are_those_of_their_function(files, tmp_path):
+    given = subject(*[files["fitted"]] * 3)
+    models = dict(given.after.models)
+    models["low"] = replace(
+        models["low"], segments={"own": SceneSegment(tmp_path / "mask", PartEdit(palette=BLUE))}
+    )
+    found = legend_colors(replace(given, scenes=(replace(given.after, models=models), given.after)))
+    assert {name: len(colors) for name, colors in found.items()} == {"low": 2, "high": 1}
+
+
 def test_shares_of_another_field_are_those_of_its_geometry_with_its_edits(files, tmp_path):
     before = subject(*[files["fitted"]] * 3)
     expected = shares_of(before, 0, ["high", "low"])
@@ -165,6 +182,8 @@ def test_shares_of_another_field_are_those_of_its_geometry_with_its_edits(files,
     assert share[..., 0].max() == 0
     assert (share[..., 1] - expected[0][..., 1]).min() > -1e-5, "what hid it is hidden"
     assert shares_of(subject(*[tmp_path / "other.yaml"] * 3), 0, ["high", "low"]) == []
+    (share, *_) = shares_of(subject(files["fitted"], tmp_path / "other.yaml", files["alone"]), 1, ["low"])
+    assert share.max() > 0.5, "a geometry that lacks a model"
 
 
 def test_a_volume_shows_light_alone_whatever_its_colours(files, tmp_path):
@@ -172,12 +191,32 @@ def test_a_volume_shows_light_alone_whatever_its_colours(files, tmp_path):
     given = subject(files["fitted"], files["exchanged"], files["fitted"])
     cuts = Cuts((Plane((1.0, 0.0, 0.0), 0.0),))
     scenes = [replace(scene, volume=volume) for scene in given.scenes]
-    bare = replace(given, scenes=(replace(scenes[0], background=(0.0, 0.0, 0.0), cuts=cuts), scenes[1]))
+    hidden = replace(scenes[0].light, occlusion=1.0)
+    first = replace(scenes[0], background=(0.0, 0.0, 0.0), cuts=cuts, light=hidden)
+    bare = replace(given, scenes=(first, scenes[1]))
     for one, other in zip(under_light_alone(bare, 0), under_light_alone(bare, 1), strict=True):
         torch.testing.assert_close(one.color, other.color)
         torch.testing.assert_close(one.color, one.color[..., :1].expand(-1, -1, 3))
         assert one.alpha.max() > 0
     assert {"depth_order", "depth_order_before"} <= values_of(bare, [METRIC]).keys()
+    models = {name: replace(each, edit=PartEdit(opacity=0.1)) for name, each in scenes[1].models.items()}
+    faint = under_light_alone(replace(given, scenes=(scenes[0], replace(scenes[1], models=models))), 1)
+    assert faint[0].alpha.sum() < 0.8 * one.alpha.sum()
+
+
+def test_the_volume_is_that_before_whatever_an_edit_starts_from(files, tmp_path):
+    """Such as a file of a scene that names another volume, or none, and has a model more."""
+    volume = sphere_volume(tmp_path, low=LOW, high=HIGH)
+    given = subject(*[files["fitted"]] * 3)
+    before = replace(given.scenes[0], volume=volume)
+    expected = under_light_alone(replace(given, scenes=(before, before)), 1)
+    more = {"more": given.after.models["high"], **given.after.models}
+    for other in (None, replace(volume, file=tmp_path / "gone.nrrd")):
+        after = replace(given.after, models=more, volume=other)
+        both = given.compositions[0], after.open()
+        measured = replace(given, scenes=(before, after), compositions=both)
+        assert torch.equal(under_light_alone(measured, 1)[0].color, expected[0].color)
+        assert {"depth_order", "depth_order_before"} <= values_of(measured, [METRIC]).keys()
 
 
 def test_a_real_volume_keeps_its_order_in_its_colours_and_loses_it_under_stripes(files, tmp_path):

@@ -5,7 +5,7 @@ there, and nothing goes farther in the end. Lightness and texture are free. Hues
 light does not change, see `texgs.core.oklab`.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Self
 
@@ -13,6 +13,8 @@ import torch
 from torch import Tensor
 
 from texgs.core.oklab import DARKEST, brightness, chromaticity, from_oklab, oklab
+from texgs.edit.canvas import require_editable
+from texgs.edit.observations import straight_colors
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import owners
 
@@ -36,13 +38,15 @@ class HueBound:
     def of(cls, models: Mapping[str, Surfels], name: str, surfels: Tensor | None, share: float) -> Self:
         """Let a look on some surfels [N] bool of a model, or all, go a share of the way to the next function.
 
-        Models are as fitted, by name; the next function is that of the most similar palette.
+        Models are as fitted, by name; the next function is that of the most similar palette. Those that are
+        not textured have none.
         """
+        require_editable(models[name], surfels)
         p = models[name].parameters
         hues = chromaticity((p["colors"] + p["palette"]).clamp(0, 1))
         middle = (hues if surfels is None else hues[surfels]).mean(0)
-        others = [chromaticity(each.parameters["palette"]) for key, each in models.items() if key != name]
-        apart = min((float((middle - other).norm()) for other in others), default=ALONE)
+        others = (each.parameters for key, each in models.items() if key != name and each.stage == "texture")
+        apart = min((float((middle - chromaticity(q["palette"])).norm()) for q in others), default=ALONE)
         return cls(hues, middle, share * max(apart, ALIKE))
 
     def toned(self, colors: Tensor) -> Tensor:
@@ -50,12 +54,17 @@ class HueBound:
 
         All get darker alike where light ones cannot be shown in this hue: they would no longer differ.
         """
-        moved = moved_hues(colors, lambda own: self.middle + self._within(own - self.middle))
+        moved = self._moved(colors, self.middle)
         lightness = moved[..., :1].clamp_min(DARKEST)
         moved = moved * (DARK_TONES / lightness + 1 - DARK_TONES)
         bright = brightness(moved).flatten()
         bright = bright[:: -(-len(bright) // SAMPLES)].quantile(LIGHT_TONES).clamp_min(1)
         return from_oklab(moved * bright ** (-1 / 3))
+
+    def toned_views(self, images: Tensor, alphas: Tensor) -> Tensor:
+        """Move the colours of views [V, H, W, 3] over white; the white stays."""
+        straight = torch.stack([straight_colors(*each) for each in zip(images, alphas, strict=True)])
+        return self.toned(straight) * alphas[..., None] + 1 - alphas[..., None]
 
     def loss(self, image: Tensor) -> dict[str, Tensor]:
         """Return the weighted mean square [] of how far pixels [3, h, w] are beyond; differentiable."""
@@ -67,14 +76,10 @@ class HueBound:
         """Return colours [T, 3] of texels, learned for the mean hue, around the hue of each surfel."""
         place, surfel = owners(model.parameters)
         own = torch.zeros_like(colors[:, :2]).index_copy_(0, place, self.hues[surfel])
-        return from_oklab(moved_hues(colors, lambda seen: own + self._within(seen - self.middle)))
+        return from_oklab(self._moved(colors, own))
 
-    def _within(self, steps: Tensor) -> Tensor:
-        """Shorten steps [..., 2] to the reach."""
-        return steps * (self.reach / steps.norm(dim=-1, keepdim=True).clamp_min(1e-6)).clamp_max(1)
-
-
-def moved_hues(colors: Tensor, move: Callable[[Tensor], Tensor]) -> Tensor:
-    """Return OKLab [..., 3] of colours [..., 3] in [0, 1] with a function of their hues [..., 2]."""
-    lightness = oklab(colors)[..., :1]
-    return torch.cat([lightness, lightness.clamp_min(DARKEST) * move(chromaticity(colors))], dim=-1)
+    def _moved(self, colors: Tensor, around: Tensor) -> Tensor:
+        """Return OKLab [..., 3] of colours as far from some hues [..., 2] as from the mean, or the reach."""
+        lightness, steps = oklab(colors)[..., :1], chromaticity(colors) - self.middle
+        steps = steps * (self.reach / steps.norm(dim=-1, keepdim=True).clamp_min(1e-6)).clamp_max(1)
+        return torch.cat([lightness, lightness.clamp_min(DARKEST) * (around + steps)], dim=-1)

@@ -208,9 +208,7 @@ MATERIALS = {
 }
 
 
-def highlights_of(
-    instruction: str, model: Surfels, surfels: Tensor | None = None, *, tinted: bool = True
-) -> dict[str, Any]:
+def highlights_of(instruction: str, model: Surfels, surfels: Tensor | None = None) -> dict[str, Any]:
     """Return values for a `PartEdit` with the highlights of the material that an instruction names.
 
     The factors bring the medians of the part's own k_s and beta, as fitted, to those of the material.
@@ -219,7 +217,6 @@ def highlights_of(
         instruction: such as "make it gold"; if it says anything more, the result is {}.
         model: relightable.
         surfels: [N] bool, surfels of the part; all by default.
-        tinted: whether they take on the hue of a metal.
     """
     from texgs.fields.surfels.shading import material
     from texgs.models.instruction import understand
@@ -231,7 +228,7 @@ def highlights_of(
     if named is None:
         return {}
     own = material(model.parameters, model.shading.material)  # [N] or [1]
-    edit: dict[str, Any] = {"tint": named.tint} if tinted else {}
+    edit: dict[str, Any] = {"tint": named.tint}
     for name in ("specular", "shininess"):
         values = own[name] if surfels is None or len(own[name]) == 1 else own[name][surfels]
         wanted, fitted = getattr(named, name), float(values.median())

@@ -104,9 +104,9 @@ class Task(Generic[Settings]):
         share: float = self.settings.hue  # type: ignore[attr-defined]
         if share == 1:
             return None
-        plain = {name: replace(each, texture=None, segments={}) for name, each in self.scene.models.items()}
-        fitted = {name: each.surfels()[0].to(self.device) for name, each in plain.items()}
-        return HueBound.of(fitted, split(self.scene, part)[0], surfels, share)
+        fitted = self.scene.as_fitted.models.items()
+        models = {name: each.surfels()[0].to(self.device) for name, each in fitted}
+        return HueBound.of(models, split(self.scene, part)[0], surfels, share)
 
     def title_of(self, part: str) -> str:
         """Return the title of a progress bar."""

@@ -14,14 +14,7 @@ from texgs.core.light import HEADLIGHT, Light
 from texgs.core.memory import require_memory
 from texgs.edit.canvas import require_editable
 from texgs.edit.hue import HueBound
-from texgs.edit.observations import (
-    LinearObservation,
-    Target,
-    join_views,
-    observe,
-    render_views,
-    straight_colors,
-)
+from texgs.edit.observations import LinearObservation, Target, join_views, observe, render_views
 from texgs.edit.steps import Shot, model_at_step, shots_of
 from texgs.edit.texel_solver import back_project, fill_unseen, learn, seen_texels, solve
 from texgs.fields.optimizer import Rate
@@ -133,7 +126,7 @@ def edit_by_text(
     shown = [render_views(each.model, each.cameras, shine, opacity) for each in shots]
     views = join_views(shown)
     edited = require_edited(guidance(views, instruction, generator), views, guidance.name)
-    edited = edited if hue is None else toned_views(edited, views.alphas, hue)
+    edited = edited if hue is None else hue.toned_views(edited, views.alphas)
     own = model if recipe.is_textured else with_single_texels(model, changing)
     opacities = [opacity * x for x in recipe.opacities]
     rows: list[list[LinearObservation]] = [[] for _ in opacities]
@@ -146,13 +139,6 @@ def edit_by_text(
     colors = colors if recipe.is_textured else spread_colors(colors, own, model)
     changing = changing if recipe.fills else changing & _shown(weights, own)
     return EditedModel(with_colors(model, colors, changing), views, edited, share)
-
-
-def toned_views(images: Tensor, alphas: Tensor, hue: HueBound) -> Tensor:
-    """Return views [V, H, W, 3] over white with colours of a bounded hue; the white stays."""
-    cover = alphas[..., None]
-    straight = torch.stack([straight_colors(*each) for each in zip(images, alphas, strict=True)])
-    return hue.toned(straight) * cover + 1 - cover
 
 
 def _require_memory(shots: Sequence[Shot], recipe: TextRecipe) -> None:

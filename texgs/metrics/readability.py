@@ -40,7 +40,8 @@ def shares_of(measured: MeasuredScene, at: int, names: list[str]) -> list[Tensor
     scene, shown = measured.scenes[at], measured.compositions[at]
     if not isinstance(shown, Composition):
         fitted = read_scene(measured.geometry_file).models
-        scene = Scene({name: replace(each, edit=scene.models[name].edit) for name, each in fitted.items()})
+        known = {name: each.edit for name, each in scene.models.items() if name in fitted}
+        scene = Scene({name: replace(fitted[name], edit=edit) for name, edit in known.items()})
         shown = scene.open(shown.device)
     if not isinstance(shown, Composition):
         return []
@@ -51,18 +52,21 @@ def shares_of(measured: MeasuredScene, at: int, names: list[str]) -> list[Tensor
 
 
 def under_light_alone(measured: MeasuredScene, at: int) -> list[Render]:
-    """Render the volume of a scene with its light and opacities over white, all functions in one grey."""
-    scene, shown = measured.scenes[at], measured.compositions[at]
-    models = {n: replace(each, edit=replace(each.edit, palette=None)) for n, each in scene.models.items()}
-    grey = {n: tf.with_points(tf.opacity, (GREY,)) for n, tf in volume_of(scene).tfs.items() if n in models}
-    twin, scene = Twin(scene, shown.device), Scene(models, scene.light.unhidden)
-    return [twin.render(camera, scene, shown.palettes, functions=grey) for camera in measured.some]
+    """Render the volume before the edit with the light and opacities of a scene, its functions in one grey.
+
+    It has a white background, and no models that are not of the volume.
+    """
+    scene, volume, device = measured.scenes[at], volume_of(measured.scenes[0]), measured.shown.device
+    known = {n: each for n, each in scene.models.items() if n in volume.tfs}
+    models = {n: replace(each, edit=replace(each.edit, palette=None)) for n, each in known.items()}
+    grey = {n: volume.tfs[n].with_points(volume.tfs[n].opacity, (GREY,)) for n in known}
+    bare = Scene(models, scene.light.unhidden, volume=volume)
+    twin, palettes = Twin(bare, device), [GREY[1:]] * len(grey)
+    return [twin.render(camera, bare, palettes, functions=grey) for camera in measured.some]
 
 
-def told_by_hue(
-    seen: Render, shares: Tensor, legend: list[Tensor], least: float = ONE_FUNCTION
-) -> tuple[Tensor, Tensor]:
-    """Return the functions of object pixels [n], and those that hue tells there.
+def told_by_hue(seen: Render, shares: Tensor, legend: list[Tensor], least: float = ONE_FUNCTION) -> Tensor:
+    """Return [2, n] the functions of object pixels, and those that hue tells there.
 
     A pixel shows the function with the largest share [H, W, M] of it, if that is at least so much of all. Hue
     tells the one with the nearest chromaticity among its colours [K, 3] in the legend.
@@ -71,12 +75,12 @@ def told_by_hue(
     where = (seen.alpha > OBJECT_ALPHA) & (total > OBJECT_ALPHA) & (largest >= least * total)
     own = chromaticity(straight(seen)[where])
     far = [torch.cdist(own, chromaticity(colors.to(own))).amin(dim=1) for colors in legend]
-    return shares[where].argmax(dim=1), torch.stack(far, dim=1).argmin(dim=1)
+    return torch.stack([shares[where].argmax(dim=1), torch.stack(far, dim=1).argmin(dim=1)])
 
 
-def mean_told(views: Sequence[tuple[Tensor, Tensor]]) -> float:
+def mean_told(views: Sequence[Tensor]) -> float:
     """Return the share of each function's pixels that are told in all views, mean over the functions."""
-    shown, told = map(torch.cat, zip(*views, strict=True))
+    shown, told = torch.cat([*views], dim=1)
     return fmean(float((told[shown == each] == each).float().mean()) for each in shown.unique())
 
 

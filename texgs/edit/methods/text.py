@@ -88,8 +88,8 @@ def run(task: Task[TextKeys]) -> EditedScene:
 
     def highlights(name: str, model: Surfels, surfels: Tensor | None) -> dict[str, Any]:
         followed = task.settings_for(name).instruction
-        is_wanted, is_free = settings.recipe_of().material, settings.hue == 1
-        return highlights_of(followed, model, surfels, tinted=is_free) if is_wanted else {}
+        given = highlights_of(followed, model, surfels) if settings.recipe_of().material else {}
+        return {name: x for name, x in given.items() if name != "tint" or settings.hue == 1}
 
     scene = task.each_part(one, highlights)
     return EditedScene(
