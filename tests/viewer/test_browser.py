@@ -391,6 +391,45 @@ def test_pictures_of_a_folder_are_on_the_scene_and_tried_at_once(chromium, scene
         assert still(page) == first
 
 
+def test_a_look_keeps_the_hues_of_the_functions_as_a_slider_says(chromium, scene_file, tmp_path):
+    Image.new("RGB", (64, 64), "red").save(tmp_path / "red.png")
+    with served(scene_file, styles=tmp_path) as (_, address), opened(chromium, address) as page:
+        page.get_by_role("button", name="New look of the scene").click()
+        hue = page.get_by_role("slider", name="Hue of the look")
+        number = page.get_by_role("spinbutton", name="Hue of the look, as a number")
+        image = page.locator("label.style", has=page.get_by_role("radio", name="red.png")).locator("img")
+        expect(hue).to_have_value("1")
+        assert [hue.get_attribute(key) for key in ("min", "max", "step")] == ["0", "1", "0.05"]
+        page.get_by_role("radio", name="red.png").check(force=True)
+        expect(page.get_by_text("A preview: nothing has changed yet.")).to_be_visible(timeout=WAIT)
+        free, small = shown(page), thumbnail(page, "red.png")
+        source = image.get_attribute("src")
+        hue.focus()
+        for _ in range(3):
+            page.keyboard.press("ArrowLeft")
+        expect(number).to_have_value("0.85")
+        page.keyboard.press("Home")
+        expect(number).to_have_value("0")
+        expect(image).not_to_have_attribute("src", source, timeout=WAIT)
+        kept = shown(page)
+        assert redness(thumbnail(page, "red.png")) < redness(small) - 10
+        assert redness(kept) < redness(free) - 5
+        source = image.get_attribute("src")
+        page.get_by_role("button", name="Reset hue of the look").click()
+        expect(hue).to_have_value("1")
+        expect(image).not_to_have_attribute("src", source, timeout=WAIT)
+        assert np.abs(shown(page) - free).mean() < JPEG
+        number.fill("1.5")
+        number.press("Tab")
+        expect(page.get_by_text("Hue of the look: expected a number from 0 to 1, got 1.5.")).to_be_visible()
+        expect(number).to_have_value("1")
+
+
+def redness(colors):
+    """Mean of how much more red than green colours [..., 3] have."""
+    return (colors[..., 0] - colors[..., 1]).mean()
+
+
 def test_edits_stand_in_the_link(chromium, scene_file):
     with served(scene_file) as (_, address), opened(chromium, address) as page:
         page.get_by_role("checkbox", name="TF02").uncheck()

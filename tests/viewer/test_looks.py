@@ -8,6 +8,7 @@ from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
+import torch
 from PIL import Image
 
 from tests.refusals import refused
@@ -15,6 +16,7 @@ from tests.viewer.pages import TOKEN, on_page, origin, page
 from tests.viewer.test_messages import VIEW
 from tests.viewer.test_segments import FRONT, ended
 from texgs.core.light import Light
+from texgs.core.oklab import chromaticity
 from texgs.edit.new_look import learn_look
 from texgs.edit.readable import MATERIALS
 from texgs.fields.part_edit import PartEdit
@@ -131,6 +133,31 @@ def test_previews_of_words_are_made_by_filters_all_else_by_a_network_that_is_the
     assert (full.guidance, full.recipe, full.size) == ("instruct_pix2pix", "default", 512)
     assert (tried.guidance, tried.recipe, tried.recipe_of().views) == ("filters", "quick", "axes")
     assert (side.guidance, side.recipe_of().views) == ("filters", "all")
+
+
+@pytest.mark.parametrize("preview", [True, False])
+@pytest.mark.parametrize("follows", [{"style": "glass"}, {"instruction": "gold"}])
+def test_the_hue_of_a_look_is_that_of_the_message(tmp_path, follows, preview):
+    looks = Looks(Styles(tmp_path), tmp_path)
+    hues = [
+        looks.recipe_of(Look(**follows, **more, preview=preview)).hue
+        for more in ({}, {"hue": 0.3}, {"hue": 0})
+    ]
+    assert hues == [1, 0.3, 0]
+
+
+@pytest.mark.parametrize("follows", [{"style": "glass"}, {"instruction": "turn it into gold"}])
+@on_page
+async def test_a_preview_may_keep_the_hues_of_the_functions(browser, follows):
+    def hue(pixels):
+        return chromaticity(torch.from_numpy(pixels / 255))
+
+    before = hue(await picture(browser))
+    off = []
+    for share in (1, 0):
+        assert await tried(browser, **follows, hue=share) == ["TF01", "TF02"]
+        off.append((hue(await picture(browser)) - before).norm(dim=-1).mean())
+    assert off[1] < 0.8 * off[0], "the rest is the mixture of layers, which a look makes more opaque"
 
 
 @on_page

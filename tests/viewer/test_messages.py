@@ -47,8 +47,9 @@ def test_messages_are_read():
         ),
         (
             {"type": "look", "parts": ["TF01"], "style": "glass", "sphere": True, "camera": CAMERA},
-            Look(("TF01",), "glass", sphere=True, camera=view.camera),
+            Look(("TF01",), "glass", sphere=True, hue=1.0, camera=view.camera),
         ),
+        ({"type": "look", "instruction": "gold", "hue": 0}, Look(instruction="gold", hue=0.0)),
         (
             {"type": "segment", "part": "TF01/a", "camera": CAMERA, "points": [[1, 2.5, True]]},
             Segment(view.camera, ((1, 2.5, True),), part="TF01/a"),
@@ -87,6 +88,8 @@ def test_a_camera_is_that_of_the_renderer_and_half_of_it_sees_the_same():
         (PICK, {"pixel": [3, 4096]}, "pixel: expected at most 4095, got 4096"),
         (EXPORT, {"stops": [CAMERA] * 21}, "stops: expected 0 to 20 values, got 21"),
         (EXPORT, {"fps": 0}, "fps: expected at least 1, got 0"),
+        ({"type": "look"}, {"hue": 1.01}, "hue: expected at most 1, got 1.01"),
+        ({"type": "look"}, {"hue": -0.01}, "hue: expected at least 0, got -0.01"),
         (MASK, {"points": [[1, "a", True]]}, "points.0.1: expected a number, got 'a'"),
         (MASK, {**DRAWN, "outline": [[1, 2], [3, 4]]}, "outline: expected 3 to 500 values, got 2"),
         (MASK, {**DRAWN, "outline": [[float("nan"), 1]] * 3}, "outline: expected a finite number"),
@@ -113,7 +116,7 @@ VALUES = st.recursive(
 
 KEYS = ("id", "camera", "mode", "moving", "before", "only", "part", "key", "value", "step", "name", "replace",
         "model", "points", "outline", "function", "view", "pixel", "kind", "stops", "seconds",
-        "fps", "parts", "style", "instruction", "sphere", "preview")  # fmt: skip
+        "fps", "parts", "style", "instruction", "sphere", "hue", "preview")  # fmt: skip
 
 
 @pytest.mark.parametrize("wanted", [None, Look])

@@ -40,6 +40,7 @@ class ShotKeys:
         least=16,
     )
     light: list[float] = key([], "azimuth and polar angle of the light; default the scene's light", "degrees")
+    legend: bool = key(False, "show names, colours and ranges of values in a corner of pictures of the scene")
     changes: list[str] = key([], "changes of the scene, in the words of texgs edit, such as TF01.opacity=0.4")
 
 
@@ -77,6 +78,7 @@ class GalleryCell:
     box: list[float]
     pixels: int | None
     light: list[float]
+    legend: bool
     changes: list[str]
 
 

@@ -55,7 +55,8 @@ class GalleryRenderer:
             if cell.show == "error":
                 session.set_of_scene("markers", ())
             camera = self._camera(cell)
-            scene = None if cell.show == "volume" else session.picture(camera, Shot()).astype("float32") / 255
+            shot = Shot(legend=cell.legend and cell.show == "scene")
+            scene = None if cell.show == "volume" else session.picture(camera, shot).astype("float32") / 255
             volume = None if cell.show == "scene" else self._volume_frame(session, camera)
         finally:
             while session.undo():

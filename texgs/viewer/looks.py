@@ -121,12 +121,13 @@ class Looks:
             picture: dict[str, Any] = {
                 "style": self._styles.source(asked.style),
                 "start": "sphere" if asked.sphere else None,
+                "hue": asked.hue,
             }
             recipes = ("preview",) if asked.preview else FULL_RECIPES
             choices = [settings_of("image", {**picture, "recipe": recipe}) for recipe in recipes]
         else:
-            words = {"instruction": asked.instruction}
-            quick: dict[str, Any] = {**words, "guidance": "filters", "recipe": "quick", "size": QUICK_SIZE}
+            words: dict[str, Any] = {"instruction": asked.instruction, "hue": asked.hue}
+            quick = {**words, "guidance": "filters", "recipe": "quick", "size": QUICK_SIZE}
             if asked.preview:
                 quick["views"] = "all" if asked.camera else None
             choices = [settings_of("text", each) for each in ([quick] if asked.preview else [words, quick])]

@@ -139,6 +139,7 @@ class Look:
     style: str = ""  # name of a picture; "" with an instruction
     instruction: str = ""  # "" with a picture
     sphere: bool = False  # the picture shows a lit sphere: normals find their colours in it
+    hue: float = key(1.0, "how far it may leave the functions' hues, see `ReadableKeys`", least=0, most=1)
     preview: bool = False  # show the look on this page alone, and change nothing
     camera: Orbit | None = None  # of a thumbnail; or the side from which words are previewed, all by default
 

@@ -1,15 +1,17 @@
 // A new look: a picture or words for a part of the scene or all of it. A picture shows at once, as a preview.
 
-import { element } from "./inputs.js";
+import { element, slider } from "./inputs.js";
 
 const get = (id) => document.getElementById(id);
 const ALL = ""; // parts
+const FREE = 1; // hue
 const REST = 400; // milliseconds without a change, after which thumbnails are made
 
 export class LookTool {
   #page;
   #painting = 0; // timer of the thumbnails that count
   #painted = new Map(); // what the pictures of thumbnails show
+  #hue = FREE; // how far the look may leave the hues of the functions
   #isTried = false; // whether the page shows a preview, or a look on its way
 
   /**
@@ -27,6 +29,12 @@ export class LookTool {
       this.#page.job.begin(this.#asked(false));
     });
     for (const id of ["look-part", "look-sphere", "look-words"]) get(id).addEventListener("change", () => this.#preview());
+    const hue = slider("Hue", "hue of the look", { max: FREE, most: FREE, step: 0.05, unedited: FREE }, (value) => {
+      hue.show(this.#hue = value ?? FREE);
+      this.#preview();
+    });
+    hue.show(this.#hue);
+    get("look-hue").prepend(hue.row);
     get("look-close").onclick = () => this.leave();
     get("look").addEventListener("keydown", ({ key }) => { if (key === "Escape") this.leave(); });
     this.#takeDrops();
@@ -147,9 +155,10 @@ export class LookTool {
 
   #asked(preview) {
     const part = get("look-part").value, instruction = get("look-words").value.trim();
-    const parts = part === ALL ? [] : [part], sphere = get("look-sphere").checked, { camera, renderer } = this.#page;
+    const parts = part === ALL ? [] : [part], sphere = get("look-sphere").checked;
+    const { camera, renderer } = this.#page, hue = this.#hue;
     const side = preview && instruction ? camera.wire(...renderer.size()) : null;
-    return { type: "look", parts, style: this.#style, instruction, sphere, preview, camera: side };
+    return { type: "look", parts, style: this.#style, instruction, sphere, hue, preview, camera: side };
   }
 
   #try(parts) {
@@ -174,7 +183,7 @@ export class LookTool {
     const { isAtWork } = this.#page.job, hasWords = get("look-words").value.trim() !== "";
     const isReady = (hasWords || this.#style) && this.#hasPart && !isAtWork;
     get("look-make").disabled = !isReady;
-    for (const each of get("look").querySelectorAll("input, select")) each.disabled = isAtWork;
+    for (const each of get("look").querySelectorAll("input, select, fieldset")) each.disabled = isAtWork;
     get("look-note").textContent = this.#isTried && !isAtWork ? "A preview: nothing has changed yet." : "";
   }
 }
