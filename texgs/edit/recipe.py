@@ -75,7 +75,7 @@ class Recipe:
         )
 
 
-DEFAULT = Recipe()
+DEFAULT = Recipe(pattern=0.7)
 PRESETS = {
     "default": DEFAULT,
     "patches": replace(DEFAULT, features=0.0, iterations=150, rate=0.025),

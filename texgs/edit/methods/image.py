@@ -41,7 +41,9 @@ class ImageKeys(ReadableKeys, StyleKeys):
         "backbone of the CLIP term, where lambda_s is below 1; metrics have their own",
         choices=CLIP_BACKBONES,
     )
-    pattern: float = key(1.0, "size of the style's pattern, as a multiple of the views' size", above=0)
+    pattern: float | None = key(
+        None, "size of the style's pattern, as a multiple of the views' size; default the recipe's", above=0
+    )
     start: str | None = key(
         None,
         "colours at the start: the picture laid onto the surface, or by normals where it shows a lit sphere, "
@@ -54,8 +56,8 @@ class ImageKeys(ReadableKeys, StyleKeys):
         """Return the recipe with the changes from the configuration."""
         from texgs.edit.recipe import preset
 
-        changes: dict[str, Any] = {"pattern": self.pattern, "is_textured": self.textured, "seed": seed}
-        for name in ("iterations", "lambda_s", "start"):
+        changes: dict[str, Any] = {"is_textured": self.textured, "seed": seed}
+        for name in ("iterations", "lambda_s", "start", "pattern"):
             if (value := getattr(self, name)) is not None:
                 changes[name] = value
         return preset(self.recipe, **changes)
