@@ -54,6 +54,7 @@ RUN = {  # words of `texgs run`, by the folder of its results
     f" dataset.engine.views.height=400 fit=quick edit=style edit.image.style={','.join(STYLES)}"
     " edit.image.recipe=preview,default",
     "engine": "dataset=engine fit=quick scenes",
+    "hue": "experiment=hue",
     "mni152": "dataset=mni152 volumes",
 }
 LOOKS = {  # title: scene file below the scenes of the demo
@@ -206,6 +207,7 @@ PICTURES = {
         copy(GALLERY, smaller=2), "text", f"{FIT} gaussians voxels text in2n igs2gs gallery"
     ),
     "styles": Picture(styles, "styles", f"{FIT} image"),
+    "hues": Picture(copy("orbital/gallery/hue/hue.png", smaller=2), "hue", f"{FIT} image gallery"),
     "slices": Picture(slices, "mni152", "volume texgs.volume.slice_picture"),
     "labels": Picture(labels, "2026-11-30-labels.csv"),
     "viewer": Picture(viewer, "engine", f"{FIT} compose texgs.viewer.server"),
