@@ -20,7 +20,7 @@ import torch
 from PIL import Image
 
 from texgs.core.camera import orbit
-from texgs.core.figures import as_picture, content, grid_rows, lay_out
+from texgs.core.figures import as_picture, grid_rows, lay_out
 from texgs.edit.methods.style import picture_of
 from texgs.edit.new_look import learn_look, look_task, readable_task, settings_of
 from texgs.metrics.edits.readability import METRIC
@@ -110,11 +110,10 @@ def sheet(arguments: argparse.Namespace, names: list[str], changes: str) -> Imag
     """Draw all looks by one setting: a row a scene."""
     styles = [Path(style).stem for style in arguments.styles.split(",")]
     files = {name: arguments.folder / name / (changes or "as-is") for name in names}
-    rows = {}
-    for name, folder in files.items():
-        pictures = [np.asarray(Image.open(folder / style / "shown.png")) for style in styles]
-        box = content(pictures)
-        rows[name] = [picture[box] for picture in pictures]
+    rows = {
+        name: [np.asarray(Image.open(folder / style / "shown.png")) for style in styles]
+        for name, folder in files.items()
+    }
     return as_picture(lay_out(grid_rows(rows, styles)))
 
 
