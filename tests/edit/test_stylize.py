@@ -196,7 +196,8 @@ def test_an_edit_starts_from_its_preview_bit_for_bit(vgg, style, start, opacity)
 
 def test_starts(style):
     names = ("projected", "sphere", "mean", "random", "transfer")
-    colors = {name: base_color(styled(style, preset("preview", start=name)).model) for name in names}
+    recipes = {name: preset("preview", start=name, pattern=1.0) for name in names}
+    colors = {name: base_color(styled(style, recipe).model) for name, recipe in recipes.items()}
     style = style.scaled(64)  # as it is laid onto views of that size
     pixels = style.pixels
     assert torch.allclose(colors["mean"], style.mean, atol=1e-5)

@@ -60,7 +60,8 @@ def test_a_scene_is_compared_with_the_volume_that_has_its_edits(scene, monkeypat
 
 
 def cell(show="scene", **changed):
-    nothing = {"view": VIEW, "fov_y": None, "box": [], "pixels": None, "light": [], "changes": []}
+    nothing = {"view": VIEW, "fov_y": None, "box": [], "pixels": None, "light": []}
+    nothing |= {"legend": False, "changes": []}
     return GalleryCell(**{"scene": "quick/none", "show": show, **nothing, **changed})
 
 
@@ -76,6 +77,13 @@ def test_a_picture_is_a_frame_of_the_changed_scene(renderer):
     np.testing.assert_array_equal(renderer.render(cell()).pixels, plain, "changes are taken back")
     assert np.abs(changed - plain).max() > 0.1
     assert renderer.render(cell("")).pixels is None, "a place may be empty"
+
+
+def test_a_picture_may_have_a_legend(renderer):
+    plain, named = (renderer.render(cell(legend=legend)).pixels for legend in (False, True))
+    differs = (plain != named).any(axis=2)
+    assert differs.any()
+    assert not differs.all(), "the rest stays"
 
 
 @pytest.mark.parametrize("show", ["scene", "volume"])
