@@ -19,7 +19,10 @@ def run(measured: MeasuredScene) -> dict[str, float]:
         told = [readability.told_by_hue(*each, colors) for each in zip(views, shares, strict=False)]
         if any(map(torch.numel, told)):
             values[f"hue_told{end}"] = readability.mean_told(told)
-        references = readability.under_light_alone(measured, at) if before.volume else [[], fitted][at]
+        if before.volume:
+            references = readability.under_light_alone(measured, at)
+        else:
+            references = fitted if end == "" else []  # the scene before has nothing to be compared with
         kept = [readability.keeps_order(*each) for each in zip(views, references, strict=False)]
         if any(map(len, kept)):
             values[f"depth_order{end}"] = float(torch.cat(kept).float().mean())
