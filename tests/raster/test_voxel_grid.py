@@ -43,10 +43,11 @@ def test_links_and_points_agree_with_the_mask():
 def test_interpolated_rows():
     scene = voxel_scene()
     grid = scene.grid
-    at = torch.rand(50, 3) * (torch.tensor(grid.size) - 1)
+    at = torch.rand(50, 3, generator=torch.Generator().manual_seed(0)) * (torch.tensor(grid.size) - 1)
     points = torch.tensor(LOWER) + SPACING * at
+    # A point is rounded to about 1e-6 of a cell, over which a row changes by up to 2e-5.
     expected = interpolate(grid.rows[grid.links().long()], at[None])[0]
-    torch.testing.assert_close(interpolate_rows(grid, points), expected, rtol=1e-4, atol=1e-5)
+    torch.testing.assert_close(interpolate_rows(grid, points), expected, rtol=1e-4, atol=5e-5)
     assert not interpolate_rows(grid, torch.tensor([[9.0, 9.0, 9.0]])).any()
 
 
