@@ -10,7 +10,7 @@ from texgs.core.lens import Lens
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.raster import Render
-from texgs.scene.mesh import fuse, write_mesh
+from texgs.scene.mesh import depth_views, fuse, write_mesh
 from texgs.volume.cameras import geodesic_vertices, icosphere
 from texgs.volume.isosurface import Mesh
 
@@ -55,7 +55,7 @@ def centroid(mesh):
 
 
 def test_exact_depth_becomes_a_sphere():
-    mesh = fuse(exact, VIEWS, VOXEL)
+    mesh = fuse(depth_views(exact, VIEWS), VOXEL)
     radii = np.linalg.norm(mesh.vertices, axis=1)
     assert np.abs(radii - RADIUS).max() < VOXEL
     assert abs(radii.mean() - RADIUS) < 0.05 * VOXEL
@@ -65,7 +65,7 @@ def test_exact_depth_becomes_a_sphere():
 
 
 def test_a_ball_of_surfels_becomes_a_sphere():
-    mesh = fuse(show(ball()), VIEWS, VOXEL)
+    mesh = fuse(depth_views(show(ball()), VIEWS), VOXEL)
     radii = np.linalg.norm(mesh.vertices, axis=1)
     # Discs that touch a sphere stand out from it, and at its rim each is wider than a pixel.
     assert 0 < radii.mean() - RADIUS < 0.4 * VOXEL
@@ -92,4 +92,4 @@ def test_plyfile_reads_the_file(tmp_path):
     ],
 )
 def test_what_makes_no_mesh(shown, views, voxel, named):
-    refused(lambda: fuse(shown, views, voxel), named)
+    refused(lambda: fuse(depth_views(shown, views), voxel), named)

@@ -33,7 +33,7 @@ from texgs.scene.clouds import place_cloud as placed_cloud
 from texgs.scene.export_keys import CLOUD_KINDS, FILE_SPACE_KINDS, Export
 from texgs.scene.gltf import write_gltf
 from texgs.scene.joined import join_surfels, write_vtp
-from texgs.scene.mesh import fuse, place_mesh, write_mesh
+from texgs.scene.mesh import depth_views, fuse, place_mesh, write_mesh
 from texgs.scene.scene import Scene
 from texgs.scene.spz import write_spz
 from texgs.scene.usd import write_usd
@@ -175,7 +175,8 @@ def _write_fused(
 ) -> Path:
     """Write the mesh fused from renders of the whole frame."""
     cameras, space = views_of(keys, frame), target_of(keys, known)
-    mesh = fuse(partial(render, background=torch.zeros(3, device=cameras[0].K.device)), cameras, keys.voxel)
+    show = partial(render, background=torch.zeros(3, device=cameras[0].K.device))
+    mesh = fuse(depth_views(show, cameras), keys.voxel)
     return write_mesh(path, mesh if space is None else place_mesh(mesh, space), facts_of(keys, known))
 
 

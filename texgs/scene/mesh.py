@@ -66,15 +66,22 @@ def colors_at(lattice: Lattice, places: np.ndarray) -> np.ndarray:
     return colors[0, :, :, 0, 0].T.round().clamp(0, 255).to(torch.uint8).numpy()
 
 
-def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: float) -> Mesh:
-    """Fuse views of a scene into a coloured surface, without small specks.
-
-    Matter that transmits more than half of the light has no surface.
+def depth_views(show: Callable[[Camera], Render], cameras: Sequence[Camera]) -> list[DepthView]:
+    """Render the surface in views of a scene. Matter that transmits more than half of the light has none.
 
     Args:
         show: renders a view over black, with `median` or else `depth`: where half of the light is left, as
             2DGS has it for objects with a boundary; or the mean, as its authors take it for 3D Gaussians.
         cameras: around the scene.
+    """
+    return [depth_view(show(camera), camera) for camera in progress(cameras, title="render", unit="view")]
+
+
+def fuse(views: Sequence[DepthView], voxel: float) -> Mesh:
+    """Fuse views of a scene into a coloured surface, without small specks.
+
+    Args:
+        views: see `depth_views`.
         voxel: edge of the lattice's cells, world units.
 
     Raises:
@@ -83,7 +90,6 @@ def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: flo
     """
     if not MIN_VOXEL <= voxel < inf:
         raise ArgumentError(f"voxel: expected a length of {MIN_VOXEL:g} or more, got {voxel}")
-    views = [depth_view(show(camera), camera) for camera in progress(cameras, title="render", unit="view")]
     boxes = [points(view).aminmax(dim=0) for view in views if bool(view.depth.any())]
     if not boxes:
         raise ArgumentError(

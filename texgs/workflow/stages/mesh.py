@@ -49,7 +49,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.fields.files import open_field
     from texgs.metrics.surface import are_visible, compare, sample
     from texgs.report.mesh_figure import write_mesh_figure
-    from texgs.scene.mesh import fuse, write_mesh
+    from texgs.scene.mesh import depth_views, fuse, write_mesh
     from texgs.volume.framing import smallest_ball
     from texgs.volume.images import smaller
     from texgs.volume.view_set import read_views
@@ -59,7 +59,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     reference = reference_of(settings, inputs["volume"])
     field = open_field(inputs["model"]).to(torch_device(settings.fit.device))
     start = time.perf_counter()
-    mesh = fuse(shown_by(field), [camera.to(field.device) for camera in cameras], keys.voxel)
+    seen = depth_views(shown_by(field), [camera.to(field.device) for camera in cameras])
+    mesh = fuse(seen, keys.voxel)
     seconds = time.perf_counter() - start
     write_mesh(output / "mesh.ply", mesh)
     write_mesh(output / "reference.ply", reference)
