@@ -26,7 +26,7 @@ from texgs.cli.main import STAGE_VERBS, VERBS, main, parse
 from texgs.config.compose import compose
 
 ROOT = Path(__file__).parents[1]
-USED = ("usage", "data", "fits", "scenes", "looks", "workflow", "api")
+USED = ("usage", "figure", "data", "fits", "scenes", "looks", "workflow", "api")
 PAGES = ("README.md", *(f"docs/{name}.md" for name in USED))
 OTHERS = {path.relative_to(ROOT).as_posix() for path in [ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md")]}
 ALL = (*PAGES, *sorted(OTHERS - set(PAGES)))  # later pages use what earlier ones wrote
@@ -57,7 +57,7 @@ INSTEAD = (
     (r"texgs doctor --experiment paper", "texgs doctor --experiment demo", "it plans 1,000 jobs"),
     (r"texgs run experiment=paper ", "texgs run experiment=demo --dry-run", "it plans 1,000 jobs"),
     (r"texgs run dataset=vortex ", "texgs run {words} --dry-run", "its views have to be downloaded"),
-    (r"texgs run dataset=scan ", "texgs run {words} volumes sheets", "that of engine goes on to the report"),
+    (r"texgs run dataset=scan fit=quick$", "texgs run {words} sheets", "that of the page on figures goes on"),
     (r"snakemake .*/profiles/local ", f"{PLAN} {{words}}", "texgs run runs the same workflow"),
     (r"snakemake .*/profiles/slurm ", f"{PLAN} --executor local --cores 1 {{words}}", "it needs a cluster"),
     (r"(ssh|git clone|tmux)( |$)", "", "it needs another machine"),
