@@ -78,8 +78,12 @@ def describe(
         # Only what has a palette has a texture, which can get a new look.
         is_textured = part is not None and part.palette is not None
         can = [*keys, "look"] if is_textured else [key for key in keys if key != "palette"]
-        own = [{"name": key, "edit": asdict(segment.edit)} for key, segment in entry.segments.items()]
+        own = [
+            {"name": key, "edit": asdict(segment.edit), "styled": segment.texture is not None}
+            for key, segment in entry.segments.items()
+        ]
         said = {"name": model, "kind": kind.name, "edit": asdict(entry.edit), "fitted_palette": list(palette)}
+        said["styled"] = entry.texture is not None
         models.append({**said, "can": [*can, *segments], "segments": own})
     known = known or bounds(scene, composed)
     light, target = scene.light, known["center"]
