@@ -16,7 +16,7 @@ from texgs.fields.surfels.composition import Composition
 from texgs.raster.shading import MATERIAL
 from texgs.scene.bounds import STRAY_SHARE, models_of, span_of
 from texgs.scene.legend import legend_of
-from texgs.scene.scene import Scene
+from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import plain_functions
 from texgs.scene.shot import Mode, Shot
 from texgs.volume.grid import closest
@@ -78,12 +78,8 @@ def describe(
         # Only what has a palette has a texture, which can get a new look.
         is_textured = part is not None and part.palette is not None
         can = [*keys, "look"] if is_textured else [key for key in keys if key != "palette"]
-        own = [
-            {"name": key, "edit": asdict(segment.edit), "styled": segment.texture is not None}
-            for key, segment in entry.segments.items()
-        ]
-        said = {"name": model, "kind": kind.name, "edit": asdict(entry.edit), "fitted_palette": list(palette)}
-        said["styled"] = entry.texture is not None
+        own = [_part(key, segment) for key, segment in entry.segments.items()]
+        said = {**_part(model, entry), "kind": kind.name, "fitted_palette": list(palette)}
         models.append({**said, "can": [*can, *segments], "segments": own})
     known = known or bounds(scene, composed)
     light, target = scene.light, known["center"]
@@ -109,6 +105,11 @@ def describe(
         "fov_y": LENS.fov_y,
         "views": [{"name": "home", "target": target, "distance": distance, **angles}],
     }
+
+
+def _part(name: str, entry: SceneModel | SceneSegment) -> dict[str, Any]:
+    """Return what a page needs of a model or a segment alone."""
+    return {"name": name, "edit": asdict(entry.edit), "styled": entry.texture is not None}
 
 
 def drawn(space: Space) -> dict[str, Any]:
