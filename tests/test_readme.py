@@ -46,7 +46,6 @@ INSTEAD = (
     (r"\./replicate", "", "it installs; test_the_script_without_parameters_runs_the_workflow reads it"),
     (r"texgs series ", "texgs series --help", "it needs files of steps; test_series.py has some"),
     (r"texgs (edit|render) steps/", "", "it needs such a series; test_series.py runs these verbs"),
-    (r"texgs export .*--kind points", "texgs {words} --opacity 0.05", "30 iterations leave surfels faint"),
     (r"texgs study", "texgs study --help", "it takes scenes of several methods"),
     (r"texgs view ", "texgs view --help", "it serves until it is interrupted"),
     (r"texgs votes", "texgs votes --help", "it takes votes of people"),

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the file."""
     from texgs.report.check import found_sentence
-    from texgs.scene.scene_file import read_scene, scene_path
+    from texgs.scene.scene_file import read_scene, scene_path, title_of
     from texgs.viewer.export import export
 
     keys, source = keys_of(arguments, Export), scene_path(arguments.source)
@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
             raise ArgumentError(f"--model: expected a scene to choose it from, got {source}; leave it out")
         keys = replace(keys, model=next(iter(scene.models)))
     require_own_place(arguments.to, "--to")
-    notes = export(arguments.to, scene, keys, found_sentence(source, scene))
+    notes = export(arguments.to, scene, keys, found_sentence(source, scene), title_of(source))
     print(arguments.to)
     for note in notes:
         print(f"{arguments.to}: {note}", file=sys.stderr)

@@ -36,6 +36,7 @@ class Frame:
         REQUIRED, "its centre [3]", "world units", least=-MAX_COORDINATE, most=MAX_COORDINATE
     )
     radius: float = key(REQUIRED, "its radius", "world units", above=0, most=MAX_COORDINATE)
+    azimuth: float = key(30.0, "of the camera that sees it first", "degrees", least=-360, most=360)
 
     def __post_init__(self) -> None:
         if len(self.target) != 3:

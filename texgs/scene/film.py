@@ -77,10 +77,11 @@ class Film(Shot):
         lens, count = lens or self.lens(scene.framed(composition)), self.count
         if self.what == "test":
             return ((camera, scene) for camera in spiral(count, lens, "frames"))
-        turn = orbit_path(count, self.polar, lens, self.azimuth)
+        azimuth = scene.framed(composition).azimuth if self.azimuth is None else self.azimuth
+        turn = orbit_path(count, self.polar, lens, azimuth)
         if self.what == "orbit":
             return ((place, scene) for place in turn)
-        camera = orbit(self.azimuth, self.polar, *lens)
+        camera = orbit(azimuth, self.polar, *lens)
         if self.what == "view":
             return repeat((camera, scene), count)
         shares = (i / max(count - 1, 1) for i in range(count))
@@ -92,7 +93,7 @@ class Film(Shot):
             low, high = sweep_range(scene, composition or scene.open())
             return ((camera, move_planes(scene, high + share * (low - high))) for share in shares)
         # from below the object to above, on the camera's side
-        lights = (scene.light.turned(self.azimuth, -90 + 180 * share) for share in shares)
+        lights = (scene.light.turned(azimuth, -90 + 180 * share) for share in shares)
         return ((camera, replace(scene, light=light)) for light in lights)
 
     def write(

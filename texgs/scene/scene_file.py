@@ -15,7 +15,7 @@ from texgs.core.keys import typed_argument
 from texgs.core.lens import Frame
 from texgs.core.light import HEADLIGHT, HIDING, Light
 from texgs.core.markers import Marker, Markers
-from texgs.core.names import SCENE, SCENES, close, is_number, label, named_file, require_name
+from texgs.core.names import METRICS, SCENE, SCENES, close, is_number, label, named_file, require_name
 from texgs.core.plain_yaml import parse_yaml
 from texgs.fields.files import formats
 from texgs.fields.part_edit import PartEdit, color
@@ -26,6 +26,7 @@ from texgs.volume.space import Space
 from texgs.volume.transfer import TransferFunction
 
 VERSION = 1
+EDITS = "edits"  # folder of edits, beside that of the composed scene
 MAX_BYTES = 1 << 20  # a scene of a hundred models has a few thousand
 SCENE_KEYS = ("light", "background", "cuts", "frame")
 MAX_LISTED = 5  # scene files of a folder, in an error
@@ -53,6 +54,15 @@ def read_scene(path: str | Path) -> Scene:
         if path.stat().st_size > MAX_BYTES:
             raise ArgumentError(f"expected a scene of at most {MAX_BYTES} bytes; is it another file?")
         return _scene(parse_yaml(path.read_text(encoding="utf-8")), path.parent)
+
+
+def title_of(path: Path) -> str:
+    """Return the name of a scene for people: data set, fit and edit of a job's, else that of its file."""
+    folders = path.resolve().parent.parts
+    if (path.parent / METRICS).exists():
+        names = folders[-5 if folders[-2] == EDITS else -4 :]
+        return " ".join(name for name in names if name not in ("scene", EDITS, "compose", "texture"))
+    return folders[-1] if path.name == SCENE else path.stem
 
 
 def scene_path(path: str | Path) -> Path:

@@ -25,6 +25,7 @@ def write_download(
     scene: Scene,
     asked: Export,
     name: str,
+    title: str,
     checked: str,
     pixels: Callable[[View, Scene], np.ndarray],
 ) -> tuple[Path, list[str]]:
@@ -35,6 +36,7 @@ def write_download(
         scene: to write.
         asked: what, and how.
         name: of the file, without its ending.
+        title: of a page.
         checked: what `texgs check` has found of the scene.
         pixels: draws a view of a scene, for films.
     """
@@ -47,7 +49,7 @@ def write_download(
         frames = (pixels(replace(view, camera=each), scene) for each in way_of(asked))
         return film_of(asked).write(path, frames, checked, title="film"), []
     keys = export_keys.Export(kind, volume=volume, steps=asked.steps if kind == "html" else "all")
-    return path, export(path, scene, keys, checked, name)
+    return path, export(path, scene, keys, checked, title)
 
 
 def film_of(asked: Export) -> Film:

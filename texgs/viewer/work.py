@@ -212,7 +212,8 @@ class Work:
         """Write a file of a scene, and return the notice about it."""
         edits = self._edits
         name, checked = Path(edits.name).stem, edits.checked(scene)
-        path, notes = write_download(self._downloads, scene, asked, name, checked, self._frames.pixels)
+        known = name, edits.title, checked
+        path, notes = write_download(self._downloads, scene, asked, *known, self._frames.pixels)
         let_stop(path.name)
         words = ", ".join([f"{path.stat().st_size / 2**20:.1f} MiB", *notes])
         return {"text": f"{path.name}: {words}", "name": path.name}

@@ -9,7 +9,7 @@ const get = (id) => document.getElementById(id);
 export class FilmInputs {
   #page;
   #size = sizeInputs();
-  #seconds = numberInput("Length, seconds", { min: 0.1, max: 600, value: 2.88 }); // 72 frames
+  #seconds = numberInput("Length, seconds", { min: 0.1, max: 600, value: 4 });
   #fps = numberInput("Frames a second", { min: 1, max: 240, value: 25 });
 
   #way = element("select", {}, new Option("One turn", "turn"), new Option("Through the bookmarks", "bookmarks"));

@@ -186,7 +186,7 @@ export class ScenePage {
 
   /** Camera, mode, bookmarks and edits as the link has them. */
   get #fragment() {
-    const { mode } = this.#shown, edits = difference(this.state.original, this.state.scene);
+    const { mode } = this.#shown, edits = difference(this.state.original, this.state.scene, true);
     const words = new URLSearchParams();
     if (mode !== "shaded") words.set("mode", mode);
     if (this.bookmarks.words) words.set("bookmarks", this.bookmarks.words);
