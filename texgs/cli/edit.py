@@ -17,11 +17,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "overrides",
         nargs="*",
         metavar="KEY=VALUE",
-        help="MODEL.KEY=VALUE with visible, palette (r,g,b from 0 to 1, or #rrggbb), opacity, ambient, "
-        "diffuse, specular, shininess (factors), tint (a colour, of highlights), texture (a file) or file "
-        "(another model); light=headlight or light=AZIMUTH,POLAR; shadows=SHARE (0 to 1) of the "
-        "light, and occlusion=SHARE of ambient light, that matter takes away; reach=DISTANCE (world units) "
-        "within which matter hides ambient light; background=#rrggbb; time=STEP of a series; "
+        help="MODEL.KEY=VALUE with visible, palette (r,g,b from 0 to 1, #rrggbb or a name such as red), "
+        "opacity, ambient, diffuse, specular, shininess (factors), tint (a colour, of highlights), "
+        "texture (a file) or file (another model); light=headlight or light=AZIMUTH,POLAR; "
+        "shadows=SHARE (0 to 1) of the light, and occlusion=SHARE of ambient light, that matter takes away; "
+        "reach=DISTANCE (world units) within which matter hides ambient light; background=COLOUR; "
+        "time=STEP of a series; "
         "cut=AXIS,POSITION (x, -x, y, ...; world units, or samples as in 64v; or R, A, S, L, P, "
         "I, X, Y, Z, of the volume's file, in its unit, as in S,-12mm) or "
         "cut=NX,NY,NZ,OFFSET adds a plane, cut.1=... replaces it, cut= takes all back; "

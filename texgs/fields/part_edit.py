@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
+from texgs.core.colors import Color, color
 from texgs.core.errors import ArgumentError
 from texgs.core.names import is_number
 from texgs.fields.kinds import kinds
@@ -22,13 +23,13 @@ class PartEdit:
     """
 
     visible: bool = True
-    palette: tuple[float, float, float] | None = None  # colour in [0, 1]; None: as fitted
+    palette: Color | None = None  # colour in [0, 1]; None: as fitted
     opacity: float = 1.0  # factor on opacities, which stay at most 1
     ambient: float = 1.0  # factors on k_a, k_d, k_s and beta
     diffuse: float = 1.0
     specular: float = 1.0
     shininess: float = 1.0
-    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)  # colour of highlights in [0, 1]
+    tint: Color = (1.0, 1.0, 1.0)  # colour of highlights in [0, 1]
 
     def __post_init__(self) -> None:
         if not isinstance(self.visible, bool):
@@ -68,18 +69,3 @@ def opacity_factors(edits: Sequence[PartEdit] | None, count: int, kind: str) -> 
     for edit in edits:
         require_possible(edit, kind)
     return [edit.opacity if edit.visible else 0.0 for edit in edits]
-
-
-def color(name: str, value: object) -> tuple[float, float, float]:
-    """Return red, green and blue in [0, 1] from a list, or from hexadecimal text such as "#ffd27f"."""
-    channels: object = value
-    if isinstance(value, str) and len(value) == 7 and value[0] == "#":
-        try:
-            channels = [int(value[i : i + 2], 16) / 255 for i in (1, 3, 5)]
-        except ValueError:
-            channels = value
-    numbers = channels if isinstance(channels, list | tuple) else ()
-    if len(numbers) != 3 or not all(is_number(x) and 0 <= x <= 1 for x in numbers):
-        raise ArgumentError(f"{name}: expected three numbers from 0 to 1 or #rrggbb, got {value!r}")
-    red, green, blue = (float(x) for x in numbers)
-    return red, green, blue

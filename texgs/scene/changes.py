@@ -152,7 +152,7 @@ def _plain(text: str) -> Any:
     try:
         return parse_yaml(f"[{text}]" if "," in text and not text.startswith("[") else text)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ArgumentError("expected a number, true, false, r,g,b or #rrggbb") from error
+        raise ArgumentError("expected a number, true, false, r,g,b, #rrggbb or a colour's name") from error
 
 
 def changed_cuts(scene: Scene, key: str, text: str) -> Cuts:

@@ -8,6 +8,7 @@ from typing import Any
 
 import yaml
 
+from texgs.core.colors import color
 from texgs.core.cuts import NO_CUTS, Cuts
 from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import reading, write_bytes
@@ -18,7 +19,7 @@ from texgs.core.markers import Marker, Markers
 from texgs.core.names import SCENE, SCENES, close, is_number, label, named_file, require_name
 from texgs.core.plain_yaml import parse_yaml
 from texgs.fields.files import formats
-from texgs.fields.part_edit import PartEdit, color
+from texgs.fields.part_edit import PartEdit
 from texgs.scene.scene import WHITE, Scene, SceneModel, SceneSegment, SceneVolume
 from texgs.scene.series_file import read_series
 from texgs.volume.render import Appearance

@@ -15,13 +15,14 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
+from texgs.core.colors import color
 from texgs.core.cuts import Cuts
 from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.light import HEADLIGHT, HIDING, Light
 from texgs.core.names import require_name
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
-from texgs.fields.part_edit import PartEdit, color, require_possible
+from texgs.fields.part_edit import PartEdit, require_possible
 from texgs.raster import Render
 from texgs.scene.cut_view import scene_and_volume
 from texgs.scene.exposure import require_shadows
