@@ -60,6 +60,11 @@ def test_an_error_is_one_sentence_and_code_2(monkeypatch, capsys):
             ["render", "a", "--widht=9"],
             "texgs render: unrecognized arguments: --widht=9, did you mean --width?",
         ),
+        (
+            ["edit", "a", "--outptu", "b"],
+            "texgs edit: unrecognized arguments: --outptu, did",
+        ),
+        (["NEW"], "texgs NEW: no such verb, did you mean new?"),
         (["run", "--jobs"], "snakemake: argument --jobs/-j: expected one argument; see snakemake --help"),
         (["run", "--cores", "x"], "texgs run: Error parsing number of cores (--cores, -c): must be integer"),
     ],

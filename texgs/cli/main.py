@@ -74,7 +74,7 @@ def overview() -> argparse.ArgumentParser:
     return top
 
 
-def parser(verb: str) -> argparse.ArgumentParser:
+def parser(verb: str) -> Parser:
     """Return the parser of a verb. Its module is imported here and must stay light: no torch at the top."""
     home = "stage" if verb in STAGE_VERBS else SHARED.get(verb, verb)
     module = importlib.import_module(f"texgs.cli.{home}")
@@ -98,7 +98,9 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
         return overview().parse_args(argv)
     if verb == "run" and words[:1] not in (["-h"], ["--help"]):
         return parser(verb).parse_args(["--", *words])  # its options are those of snakemake
-    return parser(verb).parse_intermixed_args(join_numbers(words))
+    made = parser(verb)
+    made.require_options(words)
+    return made.parse_intermixed_args(join_numbers(words))
 
 
 def join_numbers(words: Sequence[str]) -> list[str]:

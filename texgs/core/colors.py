@@ -12,9 +12,9 @@ def color(name: str, value: object) -> Color:
     Raises:
         ArgumentError: for any other value; it begins with `name`, what the colour is of.
     """
-    numbers = channels(value) if isinstance(value, str) else value
-    is_color = isinstance(numbers, list | tuple) and len(numbers) == 3
-    if not is_color or not all(is_number(x) and 0 <= x <= 1 for x in numbers):
+    found = channels(value) if isinstance(value, str) else value
+    numbers = found if isinstance(found, list | tuple) else ()
+    if len(numbers) != 3 or not all(is_number(x) and 0 <= x <= 1 for x in numbers):
         from PIL import ImageColor
 
         hint = close(value, ImageColor.colormap) if isinstance(value, str) else ""
