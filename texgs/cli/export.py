@@ -14,7 +14,7 @@ from texgs.viewer import PAGE_VOLUME
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what to export, and where to."""
-    parser.add_argument("source", type=Path, help="scene.yaml, a folder with one, or a model file")
+    parser.add_argument("scene", type=Path, help="scene.yaml, a folder with one, or a model file")
     parser.add_argument("--to", "--output", type=Path, required=True, metavar="FILE", help=" ".join(ENDINGS))
     add_keys(parser, Export, without=("volume",))
     words = (
@@ -30,7 +30,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.scene.scene_file import read_scene, scene_path
     from texgs.viewer.export import export
 
-    keys, source = keys_of(arguments, Export), scene_path(arguments.source)
+    keys, source = keys_of(arguments, Export), scene_path(arguments.scene)
     scene = read_scene(source)
     if source.suffix not in SCENES:
         if keys.model is not None:

@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
 def snakemake(words: Sequence[str]) -> bool:
     """Run the workflow of texgs in this process; return whether it ended well."""
     require_composed(words)
-    from texgs.cli.snakemake import execute, named, option_errors, overrides, parser_of
+    from texgs.cli.snakemake import execute, option_errors, overrides, parser_of
     from texgs.config.project import no_project
 
     with option_errors():
@@ -76,7 +76,7 @@ def snakemake(words: Sequence[str]) -> bool:
         if outside := no_project():
             print(f"texgs: {outside}; results are written here", file=sys.stderr)
         if profiles := profiles_of(given):
-            print(f"Using profile {named(profiles)} for options that are not given", file=sys.stderr)
+            print(f"Using profile {' and '.join(profiles)} for options that are not given", file=sys.stderr)
         options = parser_of(profiles).parse_args([*defaults(given), *rest])
     options.targets = targets
     options.config = [*(options.config or ()), *overrides(chosen, options.config or ())]
@@ -85,10 +85,7 @@ def snakemake(words: Sequence[str]) -> bool:
 
 
 def require_composed(words: Sequence[str]) -> None:
-    """Require a configuration of the words, before Snakemake, which takes a second to load and writes a log.
-
-    Not of words behind an option, which may be its values.
-    """
+    """Compose the words, where none may be the value of an option: Snakemake takes long and writes a log."""
     from texgs.workflow.cases import split_aimed
     from texgs.workflow.sweep import as_sweep
 

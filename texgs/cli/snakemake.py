@@ -50,15 +50,10 @@ def parser_of(profiles: Sequence[str] = ()) -> argparse.ArgumentParser:
 
     parser: argparse.ArgumentParser = get_argument_parser(profiles=[*profiles] or None)
     parser.prog = "snakemake"
-    where = f"{named(profiles)}: " if profiles else ""
+    of = " of SNAKEMAKE_PROFILE" if os.environ.get("SNAKEMAKE_PROFILE") in profiles else ""
+    where = f"{' and '.join(profiles)}{of}: " if profiles else ""
     parser.error = partial(Parser.error, parser, where=where)  # type: ignore[arg-type, method-assign]
     return parser
-
-
-def named(profiles: Sequence[str]) -> str:
-    """Return the names of profiles, with the variable of the environment that one comes from."""
-    variable = "SNAKEMAKE_PROFILE"
-    return " and ".join(f"{x} ({variable})" if x == os.environ.get(variable) else x for x in profiles)
 
 
 def overrides(words: Sequence[str], config: Sequence[str]) -> list[str]:

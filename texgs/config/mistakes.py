@@ -1,7 +1,6 @@
 """Mistakes in a configuration as one sentence, with the key, or the file of conf/ and its line."""
 
 import dataclasses
-import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -57,8 +56,6 @@ def sentence(error: Exception) -> str:
         group, _, name = error.missing_cfg_file.partition("/")
         known = members(group)
         hint = close(name, known) or ("; an address goes to tracking.uri" if group == "tracking" else "")
-        if not hint and group == "dataset" and os.path.exists(name):  # noqa: PTH110, never raises
-            hint = f"; texgs new {name} starts a data set from this file"
         if not hint and (outside := no_project()):
             return f"{group}={name}: {outside}; texgs itself has {', '.join(known)}"
         hint = hint or f"; one of your own is a file, conf/{group}/{name}.yaml"

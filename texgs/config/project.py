@@ -37,9 +37,7 @@ def no_project() -> str:
     if own_folder().is_dir():
         return ""
     above = next((path for path in Path.cwd().parents if (path / "conf" / "dataset").is_dir()), "PROJECT")
-    return (
-        f"this folder has no conf/, so it is no project: cd {above} goes to one, texgs init FOLDER starts one"
-    )
+    return f"this folder has no conf/, so it is no project: cd {above}, or start one by texgs init FOLDER"
 
 
 def folders() -> tuple[Path, ...]:

@@ -7,11 +7,7 @@ Color = tuple[float, float, float]  # red, green, blue in [0, 1]
 
 
 def color(name: str, value: object) -> Color:
-    """Return red, green and blue in [0, 1] of three numbers, of "#ffd27f", or of a name of CSS.
-
-    Raises:
-        ArgumentError: for any other value; it begins with `name`, what the colour is of.
-    """
+    """Return red, green, blue of three numbers, "#ffd27f" or a name of CSS; errors begin with `name`."""
     found = channels(value) if isinstance(value, str) else value
     numbers = found if isinstance(found, list | tuple) else ()
     if len(numbers) != 3 or not all(is_number(x) and 0 <= x <= 1 for x in numbers):

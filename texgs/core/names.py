@@ -102,21 +102,21 @@ def named_file(where: str, folder: Path, path: object, kind: str = "a file") -> 
     return folder / str(path)
 
 
-def close(word: object, known: Iterable[str]) -> str:
-    """Return a hint at the known word that is most like the given one, or at both; empty where none is.
+def require_scene(path: Path) -> None:
+    """Require a scene, a folder with one or a model file that is there."""
+    if not path.exists():
+        raise ArgumentError(
+            f"{path}: no such scene, folder or model; check its name, or let texgs compose write a scene"
+        )
 
-    Capital letters count as small ones, and _ as -.
-    """
-    plain, names = _plain(str(word)), {_plain(each): each for each in known}
-    similar = difflib.get_close_matches(plain, names, n=2)
-    shares = [difflib.SequenceMatcher(None, each, plain).ratio() for each in similar]
+
+def close(word: object, known: Iterable[str]) -> str:
+    """Return a hint at the known word that is most like the given one, or at both, whether capital or not."""
+    small, names = str(word).lower(), {each.lower(): each for each in known}
+    similar = difflib.get_close_matches(small, names, n=2)
+    shares = [difflib.SequenceMatcher(None, each, small).ratio() for each in similar]
     alike = [names[each] for each, share in zip(similar, shares, strict=True) if share == shares[0]]
     return f", did you mean {' or '.join(sorted(alike))}?" if alike else ""
-
-
-def _plain(word: str) -> str:
-    """Return a word in small letters, with - for _."""
-    return word.lower().replace("_", "-")
 
 
 def natural_order(path: Path, *, has_decimals: bool = False) -> list[tuple[str, Fraction]]:

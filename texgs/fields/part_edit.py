@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 
 from texgs.core.colors import Color, color
 from texgs.core.errors import ArgumentError
+from texgs.core.keys import require_keys
 from texgs.core.names import is_number
 from texgs.fields.kinds import kinds
 
@@ -12,6 +13,7 @@ MAX_FACTOR = 1000.0  # a larger factor is a typing error
 MAX_OPACITY = 1 - 1e-6  # opacity with a finite logit
 # Capability of a field that each value of an edit requires; all other values are factors of a material.
 NEEDS = {"visible": "opacity", "opacity": "opacity", "palette": "palette"}
+LOOKS = ("style", "picture", "instruction")  # keys of looks, which are not changes of numbers
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,17 @@ class PartEdit:
     def material(self) -> tuple[object, ...]:
         """Return the changed values of the material."""
         return (self.ambient, self.diffuse, self.specular, self.shininess, self.tint)
+
+
+EDIT_KEYS = tuple(each.name for each in fields(PartEdit))
+SEGMENT_KEYS = ("file", "texture", *EDIT_KEYS)  # of a part of a scene
+
+
+def require_part_key(word: str) -> None:
+    """Require that parts of scenes have the key of a change such as TF01.opacity=0.5; other words pass."""
+    part, dot, key = word.partition("=")[0].rpartition(".")
+    if dot and part != "cut" and key not in LOOKS and "/" not in key:
+        require_keys({key: None}, SEGMENT_KEYS, f"models.{part.replace('/', '.segments.')}")
 
 
 def require_possible(edit: PartEdit, kind: str) -> None:
