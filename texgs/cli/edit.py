@@ -40,10 +40,10 @@ def run(arguments: argparse.Namespace) -> int:
     for word in arguments.overrides:  # before torch, which takes a second to load
         with errors_at(word):
             require_part_key(word)
+    require_scene(arguments.output)
     from texgs.scene.changes import apply_all
     from texgs.scene.session import Session
 
-    require_scene(arguments.output)
     session = Session.open(arguments.scene)
     apply_all(session, arguments.overrides)
     with errors_at(arguments.scene):

@@ -61,15 +61,16 @@ def numbers(text: str) -> tuple[float, float]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the scene with the segment, and the segment's file; or a preview of the mask."""
+    keys = keys_of(arguments, MaskKeys)
+    require_output(arguments)
     from texgs.core.check import torch_device
     from texgs.core.image import write_png
     from texgs.edit.new_segment import clicked_model, model_name, new_segment, preview
     from texgs.models.sam import mask_model
     from texgs.scene.session import Session
 
-    session, keys = Session.open(arguments.scene), keys_of(arguments, MaskKeys)
+    session = Session.open(arguments.scene)
     name = model_name(session.scene, arguments.model, "--model")
-    require_output(arguments)
     lens = keys_of(arguments, LensKeys).lens(session.scene.framed())
     device = torch_device(arguments.device)
     clicks, masks = clicks_of(arguments, lens, device), mask_model(keys.masks, device)
