@@ -16,7 +16,7 @@ from snakemake.cli import parse_config
 from tests.refusals import refused
 from tests.workflow.project import TINY
 from texgs.cli.run import WORD, snakemake
-from texgs.cli.snakemake import overrides, place_errors
+from texgs.cli.snakemake import last_line, overrides, place_errors
 from texgs.core.errors import ArgumentError
 
 TEXGS = [sys.executable, "-m", "texgs.cli.main"]
@@ -186,6 +186,28 @@ def test_a_profile_of_another_program_is_named(tmp_path):
     assert done.returncode == 2
     told = f"snakemake: {tmp_path} of SNAKEMAKE_PROFILE: argument --executor/-e: invalid choice: 'nowhere'"
     assert done.stderr.splitlines()[-1].startswith(told)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            'Traceback (most recent call last):\n  File "a.py", line 3, in run\n    f()\n'
+            '  File "b.py", line 7, in f\n    x.y\n    ^^^\nAttributeError: no y\n',
+            "b.py, line 7: AttributeError: no y",
+        ),
+        (
+            "50 %\ntexgs views: views.width: expected at least 1, got 0\n\n",
+            "texgs views: views.width: expected at least 1, got 0",
+        ),
+        ("texgs views: interrupted; the same command goes on", ""),
+        ("", ""),
+    ],
+)
+def test_the_reason_of_a_failed_job_names_its_place(tmp_path, text, told):
+    (tmp_path / "log").write_text(text)
+    assert last_line(tmp_path / "log") == told
+    assert last_line(tmp_path / "none") == ""
 
 
 def test_a_user_without_a_home_folder_is_told_so(monkeypatch):

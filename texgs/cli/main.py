@@ -103,10 +103,7 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
         return parser(verb).parse_args(["--", *words])  # its options are those of snakemake
     made = parser(verb)
     made.require_options(words)
-    arguments = made.parse_intermixed_args(join_numbers(words))
-    if "scene" in arguments:
-        require_scene(arguments.scene)  # here, as its own code takes a second to load
-    return arguments
+    return made.parse_intermixed_args(join_numbers(words))
 
 
 def join_numbers(words: Sequence[str]) -> list[str]:
@@ -140,6 +137,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         try:
             arguments = parse(words)
+            if "scene" in arguments:
+                require_scene(arguments.scene)  # here, as its own code takes a second to load
             with as_out_of_memory():
                 return int(arguments.run(arguments))
         finally:

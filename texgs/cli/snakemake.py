@@ -8,6 +8,7 @@ This file alone uses what Snakemake does not document: `snakemake.cli`, which re
 import argparse
 import atexit
 import os
+import re
 import shlex
 import sys
 import tempfile
@@ -169,7 +170,9 @@ def tell_last_words(logs: Iterable[Path]) -> None:
 
 
 def last_line(log: Path) -> str:
-    """Return the last line with text of a log; empty where there is none, or the job was interrupted."""
+    """Return the last line of a log, with its place in the code if it has one; "" of an interrupted job."""
     text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
-    line = text.rstrip().rpartition("\n")[2]
-    return "" if INTERRUPTED in line else line
+    before, _, line = text.rstrip().rpartition("\n")
+    places = re.findall(r'^  File "(.+)", line (\d+)', before.rpartition("Traceback")[2], re.MULTILINE)
+    at = f"{places[-1][0]}, line {places[-1][1]}: " if places and not line.startswith("texgs ") else ""
+    return "" if INTERRUPTED in line else f"{at}{line}"
