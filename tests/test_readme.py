@@ -61,6 +61,7 @@ INSTEAD = (
     (r"snakemake .*/profiles/local ", f"{PLAN} {{words}}", "texgs run runs the same workflow"),
     (r"snakemake .*/profiles/slurm ", f"{PLAN} --executor local --cores 1 {{words}}", "it needs a cluster"),
     (r"(ssh|git clone|tmux)( |$)", "", "it needs another machine"),
+    (r"ln -s ", "", "it would change the installation"),
 )
 
 

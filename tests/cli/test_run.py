@@ -16,7 +16,7 @@ from snakemake.cli import parse_config
 from tests.refusals import refused
 from tests.workflow.project import TINY
 from texgs.cli.run import WORD, snakemake
-from texgs.cli.snakemake import overrides, place_errors
+from texgs.cli.snakemake import last_line, overrides, place_errors
 from texgs.core.errors import ArgumentError
 
 TEXGS = [sys.executable, "-m", "texgs.cli.main"]
@@ -98,6 +98,33 @@ def test_mistakes_end_with_2(tmp_path, words, message):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("dataset=lung fit=quick", "dataset=lung: this folder has no conf/, so it is no project: cd PROJECT"),
+        ("experiment=mine -n", "experiment=mine: this folder has no conf/"),
+        ("dataset=ENGINE", "got ENGINE, did you mean engine?"),
+        (f"dataset={'x' * 300}", "this folder has no conf/"),
+    ],
+)
+def test_a_mistake_outside_of_a_project_leaves_nothing(tmp_path, words, message):
+    done = texgs(tmp_path, "run", *words.split())
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert message in done.stderr
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.workflow
+def test_a_run_outside_of_a_project_says_so(tmp_path):
+    words = ["run", "-n", "tracking=none", *TINY.split(), "volumes", "tf=TF01"]
+    told = "texgs: this folder has no conf/, so it is no project: cd PROJECT, or start one"
+    assert told in texgs(tmp_path, *words).stderr
+    (tmp_path / "conf" / "dataset").mkdir(parents=True)
+    (tmp_path / "below").mkdir()
+    assert "no project" not in texgs(tmp_path, *words).stderr
+    assert f"cd {tmp_path}, or start one" in texgs(tmp_path / "below", "views", "dataset=lung").stderr
+
+
 @pytest.mark.workflow
 @pytest.mark.parametrize(
     ("place", "home"), [(".snakemake", ""), ("results/turbulence", ""), ("home", "home")]
@@ -157,8 +184,30 @@ def test_a_profile_of_another_program_is_named(tmp_path):
     (tmp_path / "config.yaml").write_text("executor: nowhere\n")
     done = texgs(tmp_path, "run", "-n", env={**os.environ, "SNAKEMAKE_PROFILE": str(tmp_path)})
     assert done.returncode == 2
-    told = f"snakemake: {tmp_path}: argument --executor/-e: invalid choice: 'nowhere'"
+    told = f"snakemake: {tmp_path} of SNAKEMAKE_PROFILE: argument --executor/-e: invalid choice: 'nowhere'"
     assert done.stderr.splitlines()[-1].startswith(told)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            'Traceback (most recent call last):\n  File "a.py", line 3, in run\n    f()\n'
+            '  File "b.py", line 7, in f\n    x.y\n    ^^^\nAttributeError: no y\n',
+            "b.py, line 7: AttributeError: no y",
+        ),
+        (
+            "50 %\ntexgs views: views.width: expected at least 1, got 0\n\n",
+            "texgs views: views.width: expected at least 1, got 0",
+        ),
+        ("texgs views: interrupted; the same command goes on", ""),
+        ("", ""),
+    ],
+)
+def test_the_reason_of_a_failed_job_names_its_place(tmp_path, text, told):
+    (tmp_path / "log").write_text(text)
+    assert last_line(tmp_path / "log") == told
+    assert last_line(tmp_path / "none") == ""
 
 
 def test_a_user_without_a_home_folder_is_told_so(monkeypatch):

@@ -128,7 +128,7 @@ def test_a_new_segment_looks_as_its_model_does_and_an_earlier_scene_as_it_was(se
         (lambda s: s.set("left/x", "opacity", 1), r"expected a segment of left \(it has none\), got x"),
         (lambda s: s.set("left", "opasity", 1), "models.left: no such key 'opasity', did you mean opacity"),
         (lambda s: s.set("left", "opacity", -1), "models.left.opacity: "),
-        (lambda s: s.set_of_scene("background", "red"), "background: "),
+        (lambda s: s.set_of_scene("background", "rde"), "background: .*did you mean red"),
         (lambda s: s.set_of_scene("light", "up"), "light: "),
         (lambda s: s.set_of_scene("shadows", "dark"), "light.shadows: expected a number, got 'dark'"),
         (lambda s: s.set_of_scene("reach", 3), "light.reach: expected above 0 to 2"),

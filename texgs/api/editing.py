@@ -54,7 +54,7 @@ class Editing:
     )
     reach = Value[float]("How far matter is that hides ambient light: set world units up to 2.", of="light")
     background = Value["tuple[float, float, float]"](
-        'Colour behind the scene: set red, green, blue from 0 to 1, or "#rrggbb".'
+        'Colour behind the scene: set red, green, blue from 0 to 1, "#rrggbb" or a name.'
     )
     markers = Value[tuple[Marker, ...]]("Points and distances in world units, see `mark`; None: none.")
     time = Value["int | None"]("Number of the step that is shown, of a scene of a series; None of others.")

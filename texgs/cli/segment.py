@@ -60,6 +60,8 @@ def numbers(text: str) -> tuple[float, float]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the scene with the segment, and the segment's file; or a preview of the mask."""
+    keys = keys_of(arguments, MaskKeys)
+    require_output(arguments)
     from texgs.core.check import torch_device
     from texgs.core.image import write_png
     from texgs.edit.new_segment import clicked_model, model_name, new_segment, preview
@@ -67,9 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.scene.session import Session
     from texgs.scene.shot import Shot
 
-    session, keys = Session.open(arguments.scene), keys_of(arguments, MaskKeys)
+    session = Session.open(arguments.scene)
     name = model_name(session.scene, arguments.model, "--model")
-    require_output(arguments)
     framed = session.scene.framed()
     arguments.view = arguments.view or (framed.azimuth, Shot.polar)
     lens = keys_of(arguments, LensKeys).lens(framed)

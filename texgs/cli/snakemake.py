@@ -7,6 +7,8 @@ This file alone uses what Snakemake does not document: `snakemake.cli`, which re
 
 import argparse
 import atexit
+import os
+import re
 import shlex
 import sys
 import tempfile
@@ -49,7 +51,8 @@ def parser_of(profiles: Sequence[str] = ()) -> argparse.ArgumentParser:
 
     parser: argparse.ArgumentParser = get_argument_parser(profiles=[*profiles] or None)
     parser.prog = "snakemake"
-    where = f"{' and '.join(profiles)}: " if profiles else ""
+    of = " of SNAKEMAKE_PROFILE" if os.environ.get("SNAKEMAKE_PROFILE") in profiles else ""
+    where = f"{' and '.join(profiles)}{of}: " if profiles else ""
     parser.error = partial(Parser.error, parser, where=where)  # type: ignore[arg-type, method-assign]
     return parser
 
@@ -167,7 +170,9 @@ def tell_last_words(logs: Iterable[Path]) -> None:
 
 
 def last_line(log: Path) -> str:
-    """Return the last line with text of a log; empty where there is none, or the job was interrupted."""
+    """Return the last line of a log, with its place in the code if it has one; "" of an interrupted job."""
     text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
-    line = text.rstrip().rpartition("\n")[2]
-    return "" if INTERRUPTED in line else line
+    before, _, line = text.rstrip().rpartition("\n")
+    places = re.findall(r'^  File "(.+)", line (\d+)', before.rpartition("Traceback")[2], re.MULTILINE)
+    at = f"{places[-1][0]}, line {places[-1][1]}: " if places and not line.startswith("texgs ") else ""
+    return "" if INTERRUPTED in line else f"{at}{line}"

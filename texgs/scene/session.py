@@ -15,13 +15,15 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
+from texgs.core.colors import color
 from texgs.core.cuts import Cuts
 from texgs.core.errors import ArgumentError, errors_at
+from texgs.core.keys import require_keys
 from texgs.core.light import HEADLIGHT, HIDING, Light
 from texgs.core.names import require_name
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
-from texgs.fields.part_edit import PartEdit, color, require_possible
+from texgs.fields.part_edit import EDIT_KEYS, PartEdit, require_possible
 from texgs.raster import Render
 from texgs.scene.cut_view import scene_and_volume
 from texgs.scene.exposure import require_shadows
@@ -30,16 +32,7 @@ from texgs.scene.legend import legend_of
 from texgs.scene.marks import with_marks
 from texgs.scene.parts import NewLook, entry_of, key_path, replace_entry, require_new, split, with_looks
 from texgs.scene.scene import WHITE, Scene, SceneSegment
-from texgs.scene.scene_file import (
-    EDIT_KEYS,
-    cuts_of,
-    functions_of,
-    light_of,
-    markers_of,
-    read_scene,
-    require_keys,
-    write_scene,
-)
+from texgs.scene.scene_file import cuts_of, functions_of, light_of, markers_of, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.scene.shot import Mode, Shot
 from texgs.scene.twin import Twin, last_of, needs_twin
