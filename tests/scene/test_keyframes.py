@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
+import texgs
 from tests.refusals import refused
 from tests.scene.balls import ball_models, balls_in_a_volume, write_balls
 from texgs.cli.main import main
@@ -217,5 +218,7 @@ def test_a_film_through_keys_has_its_own_length_and_movement(tmp_path, capsys):
     assert main([*words, str(tmp_path / "x"), "--path", "orbit"]) == 2
     assert "--film: expected no --path" in capsys.readouterr().err
     assert main([*words, str(tmp_path / "x.gif")]) == 0
+    texgs.open(scene).film(tmp_path / "y.gif", keys=keys, width=32, fps=2)
+    assert (tmp_path / "x.gif").read_bytes() == (tmp_path / "y.gif").read_bytes()
     with Image.open(tmp_path / "x.gif") as film:
         assert film.n_frames == 3
