@@ -78,11 +78,11 @@ def test_edits_of_bookmarks_come_back_and_move_in_films_that_the_command_line_ma
         expect(page.get_by_role("spinbutton", name="Opacity of TF01, as a number")).to_have_value("1")
         fitted = pixels(still(page))
         assert np.abs(edited - fitted).mean() > 1
-        shown = film(page, "Through the bookmarks, with their edits")
+        shown = film(page, "Bookmarks with their edits")
         assert [np.abs(shown[at] - end).mean() < 3 for at, end in ((0, fitted), (2, edited))] == [True, True]
         plain = film(page)
         assert np.abs(plain[-1] - fitted).mean() < 3, "of the scene as it is"
-        made = exported(page, "Keys of a film, YAML", "Through the bookmarks, with their edits")
+        made = exported(page, "Keys of a film, YAML", "Bookmarks with their edits")
         keys = shutil.copy(made, tmp_path / "scene-keys.yaml")  # the browser removes its own
         told = page.get_by_text("This film again: texgs render scene.yaml --film scene-keys.yaml")
         words = re.search("--width .* --fps 10", told.inner_text())[0].split()

@@ -32,7 +32,7 @@ Stop = tuple[Any, Scene]  # a shot, and what it shows
 class Key(Shot):
     """A shot that a film passes, and what changes of the scene since the key before."""
 
-    seconds: float = key(2.0, "to the next key", above=0)
+    seconds: float = key(2.0, "to the next key", above=0, most=86400)
     words: tuple[str, ...] = ()  # changes, see `apply_all`
     at: int = 0  # frame
     where: str = ""  # file and number, from 1 on

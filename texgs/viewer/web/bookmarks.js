@@ -54,7 +54,7 @@ export class Bookmarks {
     this.kept = kept;
     this.#keep.disabled = kept.length >= MOST;
     this.#again = kept.map((each, index) => this.#button(`Go to bookmark ${index + 1} and make its edits again`,
-      { className: "edits", onclick: () => this.#restore(each) }, "with its edits"));
+      { className: "edits", onclick: () => this.#restore(each) }, "Edits"));
     replaceButtons(this.#list, kept.map((each, index) => this.#item(each, index)));
     this.#show();
     this.#page.draw(); // which writes the link

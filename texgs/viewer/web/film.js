@@ -15,7 +15,7 @@ export class FilmInputs {
   #fps = numberInput("Frames a second", { min: 1, max: 240, value: 25 });
 
   #way = element("select", {}, new Option("One turn", "turn"), new Option("Through the bookmarks", "bookmarks"),
-    new Option("Through the bookmarks, with their edits", "edits"));
+    new Option("Bookmarks with their edits", "edits"));
 
   /** @param {ScenePage} page */
   constructor(page) {
@@ -41,12 +41,13 @@ export class FilmInputs {
 
   /** Save the keys as a file, and say how the command line makes the film of them. */
   save() {
-    const { keys, fps, size: [width, height] } = this.values, { file, saved } = this.#page.state;
+    const { keys, fps, size: [width, height] } = this.values, { file, past, saved } = this.#page.state;
     const name = file.replace(/(\.ya?ml)?$/, "-keys.yaml"), { mode } = this.#page.shown;
     download(new Blob(keys.map((key) => `- ${JSON.stringify(key)}\n`)), name);
     const options = `--width ${width} --height ${height} --fps ${fps}${mode === "shaded" ? "" : ` --mode ${mode}`}`;
     const first = saved ? "" : " Save the scene first.";
-    this.#page.notices.tell(`This film again: texgs render ${file} --film ${name} ${options}.${first}`, "info");
+    const scene = past.length ? file : "SCENE"; // as it was opened, wherever that is
+    this.#page.notices.tell(`This film again: texgs render ${scene} --film ${name} ${options}.${first}`, "info");
   }
 
   /** Keys as `texgs render --film` has them, evenly over all frames; edits are those since the key before. */
