@@ -105,6 +105,8 @@ def project(tmp_path_factory):
     for name, samples in (("scan", values), ("ct", values), ("segmentation", labels)):
         nibabel.save(nibabel.Nifti1Image(samples, np.eye(4)), folder / f"{name}.nii.gz")
     SimpleITK.WriteImage(SimpleITK.GetImageFromArray(labels), folder / "segmentation.seg.nrrd")
+    (keys,) = (block for block in blocks("docs/scenes.md", "yaml") if "azimuth" in block)
+    (folder / "keys.yaml").write_text(keys)
     return folder
 
 
@@ -129,7 +131,7 @@ def small(words):
         return [verb, *(word for word in SMALL.split() if word.partition("=")[0] not in given), *rest]
     if verb == "render":
         rest = [word for word in rest if word not in ("--width", "1200")]
-        frames = ["--frames", "3"] if "--path" in rest else []
+        frames = ["--frames", "3"] if "--path" in rest else ["--fps", "1"] if "--film" in rest else []
         return [verb, *rest, "--width", "32", "--height", "32", *frames]
     if verb == "export" and "mesh" in rest:
         return [*words, "--voxel", "0.02"]

@@ -217,7 +217,7 @@ def test_a_mistake_in_an_edit_writes_nothing(scene, tmp_path, monkeypatch, capsy
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--frames", "3", "--seconds", "2"], "frames: expected a number of frames or of seconds, got both"),
+        (["--frames", "3", "--seconds", "2"], "frames: expected a number of frames or of seconds, or keys"),
         (["--transparent"], "x.mp4: expected PNG for transparent pictures, got .mp4"),
         (["--transparent", "--caption"], "--transparent: expected neither --compare nor --caption"),
         (["--path", "orbit", "--output", "x.png"], "x.png: expected one frame, got 72; use .gif, .mp4 or"),

@@ -18,7 +18,6 @@ import yaml
 from texgs.core.cuts import AXES, NO_CUTS, Box, Cuts, Plane, along
 from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.keys import require_keys, typed_argument
-from texgs.core.light import HIDING
 from texgs.core.markers import Marker
 from texgs.core.names import is_number
 from texgs.core.plain_yaml import parse_yaml
@@ -83,7 +82,7 @@ def _apply(session: Session, word: str) -> None:
         models = ", ".join(session.scene.models)
         raise ArgumentError(f"expected a model of the scene ({models}), got {part}")
     else:
-        require_keys({name: text}, ("light", *HIDING, "background", "cut", *PLACES, "time"), "the scene")
+        require_keys({name: text}, ("cut", *PLACES, *SCENE_KEYS), "the scene")
         session.set_of_scene(name, _plain(text) if text else SCENE_KEYS[name])
 
 
@@ -150,7 +149,7 @@ def _plain(text: str) -> Any:
     if text.startswith("#"):
         return text
     try:
-        return parse_yaml(f"[{text}]" if "," in text and not text.startswith("[") else text)
+        return parse_yaml(f"[{text}]" if "," in text and text[0] not in "[{" else text)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ArgumentError("expected a number, true, false, r,g,b, #rrggbb or a colour's name") from error
 

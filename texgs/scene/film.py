@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import repeat
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
@@ -44,16 +44,23 @@ class Film(Shot):
     )
     seconds: float | None = key(None, "length of a film, in place of a number of frames", above=0)
     fps: float = key(25.0, "frames per second", above=0)
+    keys: Any = key(None, "file of keyframes, or a list in Python, in place of a movement", option="film")
 
     def __post_init__(self) -> None:
-        if self.frames is not None and self.seconds is not None:
-            raise ArgumentError("frames: expected a number of frames or of seconds, got both")
+        if self.keys is not None:
+            from texgs.scene.keyframes import read_keys
+
+            object.__setattr__(self, "keys", read_keys(self.keys, self, self.fps))
+        if sum(each is not None for each in (self.frames, self.seconds, self.keys)) > 1:
+            raise ArgumentError("frames: expected a number of frames or of seconds, or keys, got several")
         if self.count > MAX_FRAMES:
             raise ArgumentError(f"seconds: expected at most {MAX_FRAMES} frames, got {self.count}")
 
     @property
     def count(self) -> int:
         """Return the number of frames."""
+        if self.keys is not None:
+            return self.keys[-1].at + 1
         if self.seconds is not None:
             return max(1, round(self.seconds * self.fps))
         return COUNTS[self.what] if self.frames is None else self.frames
@@ -72,9 +79,14 @@ class Film(Shot):
             ArgumentError: if a cut or time is to move, and the scene has none.
         """
         from texgs.core.camera import orbit
+        from texgs.scene.keyframes import keyed_shots
         from texgs.volume.cameras import orbit_path, spiral
 
-        lens, count = lens or self.lens(scene.framed(composition)), self.count
+        framed = scene.framed(composition)
+        if self.keys is not None:
+            keyed = keyed_shots(self.keys, scene, composition or scene.open())
+            return ((shot.camera(framed), shown) for shot, shown in keyed)
+        lens, count = lens or self.lens(framed), self.count
         if self.what == "test":
             return ((camera, scene) for camera in spiral(count, lens, "frames"))
         azimuth = scene.framed(composition).azimuth if self.azimuth is None else self.azimuth

@@ -164,10 +164,10 @@ export class ScenePage {
     const mode = words.get("mode") ?? "shaded", wrong = modes.includes(mode) ? [] : ["mode"];
     this.camera.goHome(this.canvas.clientWidth, this.canvas.clientHeight);
     this.camera.follow(words, wrong);
-    this.bookmarks.follow(words, wrong);
     this.show({ mode: modes.includes(mode) ? mode : "shaded" });
     const isOfAnother = (words.get("scene") ?? scene.name) !== scene.name;
     const edits = isOfAnother ? [] : editsOf(words.get("edits"), scene, wrong);
+    this.bookmarks.follow(words, edits, wrong);
     const missing = edits.filter((edit) => isDifferent(scene, edit));
     if (missing.length) this.makeEdits(missing);
     if (wrong.length) this.notices.tell(`This page cannot use of the link: ${wrong.join(", ").slice(0, 200)}.`, "error");
@@ -189,8 +189,8 @@ export class ScenePage {
     const { mode } = this.#shown, edits = difference(this.state.original, this.state.scene, true);
     const words = new URLSearchParams();
     if (mode !== "shaded") words.set("mode", mode);
-    if (this.bookmarks.words) words.set("bookmarks", this.bookmarks.words);
-    if (edits.length) {
+    for (const each of this.bookmarks.words) words.append(...each);
+    if (edits.length || words.has("kept")) {
       words.set("scene", this.state.scene.name); // edits of one scene are none of another
       words.set("edits", JSON.stringify(edits));
     }
