@@ -55,7 +55,7 @@ bench: $(VENV)/installed
 	OMP_PROC_BIND=true $(BIN)/python -m benchmarks $(ARGS)
 
 demo: $(VENV)/installed
-	$(BIN)/snakemake --workflow-profile workflow/profiles/local --config experiment=demo $(ARGS)
+	$(BIN)/texgs run experiment=demo $(ARGS)
 
 lint: $(VENV)/dependencies
 	$(BIN)/ruff check .

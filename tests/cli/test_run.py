@@ -1,5 +1,6 @@
 """`texgs run`: which words are of the configuration and which of snakemake, exit codes, Ctrl-C."""
 
+import contextlib
 import errno
 import os
 import re
@@ -233,3 +234,49 @@ def test_a_run_for_one_target_names_no_report(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "Done: what was asked for" in done.stdout
     assert "report.html" not in done.stdout
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Errors of a run whose second job fails, and those of the same with `--verbose`; the folder."""
+    folder = tmp_path_factory.mktemp("runs")
+    (folder / "results/turbulence/transfer").mkdir(parents=True)
+    (folder / "results/turbulence/transfer/mine.txt").touch()
+    words = ["run", "--cores", "1", "tracking=none", *TINY.split(), "volumes"]
+    return texgs(folder, *words), texgs(folder, *words, "--verbose"), folder, words
+
+
+@pytest.mark.workflow
+def test_without_a_terminal_there_are_plain_lines_and_errors_in_whole(runs):
+    plain, verbose, _, _ = runs
+    assert plain.returncode == verbose.returncode == 1
+    lines = [" ".join(line.split()) for line in plain.stderr.splitlines()]
+    assert lines[1:-2] == [
+        "volume turbulence started",
+        *(line for line in lines if line.startswith("1 of 2 volume turbulence ")),
+        "transfer turbulence started",
+    ]
+    assert lines[-2] == "failed transfer turbulence see results/logs/turbulence/transfer.log"
+    reason = verbose.stderr.splitlines()[-1]
+    assert lines[-1] == reason.strip()
+    assert "\x1b" not in plain.stderr
+    assert "rule transfer:" in verbose.stderr
+    assert "1 of 2 steps" not in plain.stderr
+
+
+@pytest.mark.workflow
+def test_a_terminal_gets_bars(runs):
+    _, _, folder, words = runs
+    main, other = os.openpty()
+    process = subprocess.Popen([*TEXGS, *words], cwd=folder, stdout=subprocess.PIPE, stderr=other)
+    os.close(other)
+    told = b""
+    with contextlib.suppress(OSError):  # how a terminal ends
+        while part := os.read(main, 4096):
+            told += part
+    os.close(main)
+    assert process.wait(100) == 1
+    assert b"all jobs" in told
+    assert b"0 of 1 jobs" in told
+    assert b"started" not in told
+    assert b"\x1b[?25h" in told, "the cursor is shown again"

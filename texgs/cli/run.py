@@ -81,7 +81,8 @@ def snakemake(words: Sequence[str]) -> bool:
     options.targets = targets
     options.config = [*(options.config or ()), *overrides(chosen, options.config or ())]
     sys.argv = ["snakemake", *rest]  # the Snakefile looks there
-    return execute(options)
+    options.verbose = False  # it asks for Snakemake's log, whose own `verbose` is for its developers
+    return execute(options, own_log=not (given.verbose or given.dryrun or given.quiet or given.logger))
 
 
 def require_composed(words: Sequence[str]) -> None:
