@@ -37,6 +37,7 @@ PLANE = (
 DIRECTIONS = "RASLPIXYZ"  # axes of the space of a volume's file
 BOX = "X0,Y0,Z0,X1,Y1,Z1, in world units"
 PLACES = {"marker": "TEXT@X,Y,Z", "distance": "X,Y,Z:X,Y,Z or TEXT@X,Y,Z:X,Y,Z"}  # words of new markers
+TABLES = ("cuts", "functions", "markers")  # whole, as scene files have them
 VOXEL_SUFFIX = "v"  # after a position in samples, counted from 0
 
 
@@ -82,7 +83,10 @@ def _apply(session: Session, word: str) -> None:
         models = ", ".join(session.scene.models)
         raise ArgumentError(f"expected a model of the scene ({models}), got {part}")
     else:
-        require_keys({name: text}, ("cut", *PLACES, *SCENE_KEYS), "the scene")
+        tables = () if not text or text[0] in "[{" else TABLES
+        require_keys(
+            {name: text}, [each for each in (*SCENE_KEYS, "cut", *PLACES) if each not in tables], "the scene"
+        )
         session.set_of_scene(name, _plain(text) if text else SCENE_KEYS[name])
 
 
