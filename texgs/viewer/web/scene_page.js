@@ -65,6 +65,7 @@ export class ScenePage {
     this.canvas = get("picture");
     this.state = state;
     this.renderer = renderer;
+    renderer.onframe = (view, facts) => this.framed(view, facts);
     this.camera = new OrbitCamera(state.scene);
     this.light = new LightControl(get("light"), state, this.camera);
     this.notices = notices;
@@ -110,10 +111,16 @@ export class ScenePage {
   show(values) {
     Object.assign(this.#shown, values);
     get("mode").value = this.#shown.mode;
-    get("mode-legend").textContent = this.#words(this.#shown.mode)[1];
-    get("badge").hidden = !this.#shown.before;
     get("before").setAttribute("aria-pressed", this.#shown.before);
-    this.draw();
+    this.draw(true);
+  }
+
+  /** Say what is on the screen now: it may be older than what is chosen. */
+  framed({ mode, before }) {
+    this.onScreen = mode;
+    get("mode-legend").textContent = this.words(mode)[1];
+    get("badge").hidden = !before;
+    this.compare?.show();
   }
 
   /** Draw a frame; while something moves, a fast one now and a whole one at rest. */
@@ -121,6 +128,7 @@ export class ScenePage {
     this.renderer.draw(this.camera, this.state.scene, { moving, ...this.#shown });
     get("marks").toggleAttribute("hidden", !this.isOfCamera);
     for (const each of this.#marks) each.draw();
+    this.compare?.show();
     clearTimeout(this.#resting);
     const still = Math.max(REST, 2 * (this.renderer.took ?? 0), this.time?.pause ?? 0);
     this.#resting = setTimeout(() => this.#rest(moving), still);
@@ -198,7 +206,7 @@ export class ScenePage {
   }
 
   /** The name of a mode, and what its colours mean. */
-  #words(mode) {
+  words(mode) {
     return this.state.scene.volume && OF_VOLUME[mode] || MODES[mode];
   }
 
@@ -216,7 +224,7 @@ export class ScenePage {
 
   #inputs() {
     const mode = get("mode"), view = get("view"), fov = get("fov");
-    mode.append(...this.renderer.modes.map((name) => new Option(this.#words(name)[0], name)));
+    mode.append(...this.renderer.modes.map((name) => new Option(this.words(name)[0], name)));
     mode.addEventListener("change", () => this.show({ mode: mode.value }));
     const [home, ...trained] = this.state.scene.views.map(({ name }) => new Option(capital(name), name));
     view.append(home, ...Object.keys(AXES).map((name) => new Option(`From ${name}`, name)));
