@@ -13,7 +13,8 @@ class Gate:
     """A connection that holds frames back: whole ones, or all."""
 
     def __init__(self, page):
-        self.is_open, self.asked, self._held = dict.fromkeys((False, True), True), {}, []  # by `moving`
+        self.is_open, self.asked = dict.fromkeys((False, True), True), {}  # by `moving`, and by ids
+        self.passed, self._held = set(), []
         page.route_web_socket(re.compile("/socket$"), self._connect)
 
     def open(self, *, moving):
@@ -36,10 +37,11 @@ class Gate:
     def _pass(self, message):
         if isinstance(message, bytes):
             (length,) = struct.unpack_from("<I", message)
-            view = self.asked[json.loads(message[4 : 4 + length])["id"]]
-            if not self.is_open[view["moving"]]:
+            number = json.loads(message[4 : 4 + length])["id"]
+            if not self.is_open[self.asked[number]["moving"]]:
                 self._held.append(message)
                 return
+            self.passed.add(number)
         self._route.send(message)
 
 
@@ -94,3 +96,24 @@ def test_who_turns_does_not_wait_for_a_whole_frame(gated):
     settle(page)
     assert not gate.asked[max(gate.asked)]["moving"]
     expect(page.locator("#drawing")).to_be_hidden()
+
+
+def test_a_hand_that_pauses_is_not_at_rest(gated):
+    page, gate = gated
+    box, before = page.locator("#picture").bounding_box(), max(gate.asked)
+
+    def asked_since():
+        return [view["moving"] for number, view in gate.asked.items() if number > before]
+
+    page.clock.install()
+    page.mouse.move(box["x"] + 200, box["y"] + 200)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 220, box["y"] + 200)
+    while before + 1 not in gate.passed:
+        page.wait_for_timeout(10)
+    page.clock.run_for(300)
+    assert asked_since() == [True]
+    page.mouse.up()
+    page.clock.run_for(300)
+    settle(page)
+    assert asked_since() == [True, False]

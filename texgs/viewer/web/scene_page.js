@@ -20,6 +20,7 @@ import { SlicesInScene } from "./slices_in_scene.js";
 import { difference, edited } from "./state.js";
 
 const REST = 100; // milliseconds after the last movement until a whole frame is drawn
+const HELD = 500; // the same while a button is down: a hand that pauses goes on, and needs the processors then
 const ERROR = "Of the worst channel: red where the scene is too bright, blue where it is too dark.";
 const MODES = { // names, and what their colours mean
   shaded: ["Shaded", ""],
@@ -51,6 +52,8 @@ function isDifferent(scene, edit) {
 
 export class ScenePage {
   #resting = 0; // timer
+  #still = REST;
+  #moving = false; // whether the newest frame was drawn for something that moves
   #shown = { mode: "shaded", before: false, only: "", gain: 4, wipe: 0.5, legend: false };
   #isLocked;
   #marks; // what lies over the picture
@@ -83,6 +86,8 @@ export class ScenePage {
       if (this.#shown.before) this.show({ before: false });
     });
     state.addEventListener("change", () => this.draw(true));
+    window.addEventListener("pointerdown", () => this.#hold(HELD), true);
+    for (const end of ["pointerup", "pointercancel"]) window.addEventListener(end, () => this.#hold(REST), true);
     new ResizeObserver(() => this.draw(true)).observe(this.canvas);
     document.addEventListener("refused", ({ detail }) => notices.tell(detail, "error"));
     window.addEventListener("hashchange", () => this.follow());
@@ -129,9 +134,20 @@ export class ScenePage {
     get("marks").toggleAttribute("hidden", !this.isOfCamera);
     for (const each of this.#marks) each.draw();
     this.compare?.show();
+    this.#moving = moving;
+    this.#waitForRest();
+  }
+
+  #waitForRest() {
     clearTimeout(this.#resting);
-    const still = Math.max(REST, 2 * (this.renderer.took ?? 0), this.time?.pause ?? 0);
-    this.#resting = setTimeout(() => this.#rest(moving), still);
+    const still = Math.max(this.#still, 2 * this.renderer.took, this.time?.pause ?? 0);
+    this.#resting = setTimeout(() => this.#rest(), still);
+  }
+
+  /** A button or finger goes down or up. */
+  #hold(still) {
+    this.#still = still;
+    if (this.#resting) this.#waitForRest();
   }
 
   /** The camera was moved. */
@@ -210,8 +226,9 @@ export class ScenePage {
     return this.state.scene.volume && OF_VOLUME[mode] || MODES[mode];
   }
 
-  #rest(moving) {
-    if (moving) this.renderer.draw(this.camera, this.state.scene, { moving: false, ...this.#shown });
+  #rest() {
+    this.#resting = 0;
+    if (this.#moving) this.renderer.draw(this.camera, this.state.scene, { moving: false, ...this.#shown });
     const { mode, legend } = this.#shown, marked = legend && !OPTIONS[mode] ? " --legend" : ""; // not beside --compare
     const asked = `${OPTIONS[mode] ?? ` --mode ${mode}`}${marked}`;
     get("options").textContent = `texgs render ${this.camera.options(...this.renderer.size())}${asked}`;
