@@ -102,18 +102,20 @@ def test_a_hand_that_pauses_is_not_at_rest(gated):
     page, gate = gated
     box, before = page.locator("#picture").bounding_box(), max(gate.asked)
 
-    def asked_since():
+    def asked():
+        page.wait_for_timeout(300)  # for messages on their way
         return [view["moving"] for number, view in gate.asked.items() if number > before]
 
-    page.clock.install()
+    page.clock.install(time=0)
+    page.clock.pause_at(1000)  # frames take no time
     page.mouse.move(box["x"] + 200, box["y"] + 200)
     page.mouse.down()
-    page.mouse.move(box["x"] + 220, box["y"] + 200)
-    while before + 1 not in gate.passed:
-        page.wait_for_timeout(10)
+    for number in (1, 2):
+        page.mouse.move(box["x"] + 200 + number, box["y"] + 200)
+        while before + number not in gate.passed:
+            page.wait_for_timeout(10)
     page.clock.run_for(300)
-    assert asked_since() == [True]
+    assert asked() == [True, True]
     page.mouse.up()
     page.clock.run_for(300)
-    settle(page)
-    assert asked_since() == [True, False]
+    assert asked() == [True, True, False]
