@@ -8,6 +8,7 @@ const LONGEST = 250; // milliseconds of a frame that count: the first one of a v
 export class Remote {
   #canvas; #context; #notice; #connection;
   #asked = null; // id of the newest frame that is on its way
+  #newest = 0; // id of the frame that was asked for last
   #wanted = null; // the newest view that was not asked for yet
   #latest = null; // the view that was asked for last, to ask again after a break
   #views = new Map(); // what frames on their way show, and when they were asked for, by their ids
@@ -93,7 +94,7 @@ export class Remote {
     if (!this.#wanted || !this.#connection?.isOpen) return;
     this.#latest = this.#wanted;
     this.#wanted = null;
-    this.#asked = ++this.#count;
+    this.#asked = this.#newest = ++this.#count;
     this.#views.set(this.#asked, { ...this.#latest, at: performance.now() });
     this.#connection.send({ type: "view", id: this.#asked, ...this.#latest });
     this.onwait(this.#latest);
@@ -142,7 +143,7 @@ export class Remote {
     this.#isPair = isPair;
     this.#paint();
     this.#shown = header.id;
-    if (!view.moving && !this.#asked) canvas.setAttribute("aria-busy", "false");
+    if (!view.moving && header.id === this.#newest) canvas.setAttribute("aria-busy", "false");
     this.onframe(view, { ...header, width: picture.width / (isPair ? 2 : 1), height: picture.height });
   }
 
