@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import torch
 
 from texgs.config.kept_function import keep
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, Stopped
 from texgs.core.progress import let_stop, watching
 from texgs.edit.function_model import FIRST_MODEL, fit_function, overlap_of
 from texgs.scene.parts import NewLook
@@ -24,7 +24,7 @@ from texgs.viewer.downloads import write_download
 from texgs.viewer.frames import Frames
 from texgs.viewer.looks import Looks
 from texgs.viewer.messages import Export, Fit, Job, Keep, Look, Mask, Segment
-from texgs.viewer.page import Page, Stopped
+from texgs.viewer.page import Page
 from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.styles import Styles
