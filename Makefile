@@ -7,7 +7,7 @@ unexport PYTHONDONTWRITEBYTECODE # tests and jobs start hundreds of processes
 NATIVE := $(shell find texgs/raster/csrc -name '*.h' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh' -o -name '*.txt')
 FORMATTED := $(filter-out %.txt,$(NATIVE)) $(shell find tests -name '*.h' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh')
 
-.PHONY: help install test test-all test-cpus test-cluster bench lint demo lock clean
+.PHONY: help install again test test-all test-cpus test-cluster bench lint demo lock clean
 
 help:
 	@echo "make demo      from a small generated volume to an edited scene and results/report.html"
@@ -67,10 +67,15 @@ lint: $(VENV)/dependencies
 	$(BIN)/snakemake --lint
 	$(BIN)/python -m pytest tests/test_layers.py
 
-# Not quiet: pip says every minute that it is still at work.
-$(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt texgs/core/native_sources.py $(NATIVE)
-	@echo "Compiling the native library (some minutes on two cores, with CUDA twice as many) and installing texgs"
-	@$(PIP) --verbose install --no-build-isolation --no-deps --editable .
+# CMake writes into the source tree, and remembers its options; pip has only to find what is there.
+CONFIGURE = $(BIN)/cmake -S . -B build/editable -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) \
+	-DPython_EXECUTABLE=$(abspath $(BIN)/python) $(if $(CUDA),-DTEXGS_CUDA=$(if $(filter 0,$(CUDA)),OFF,ON)) $(CMAKE_ARGS)
+$(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt texgs/core/native_sources.py $(NATIVE) $(if $(CUDA),again)
+	@echo "Compiling the native library: steps done, of all, and seconds"
+	@$(CONFIGURE) > build/editable.log || { cat build/editable.log; exit 1; }
+	@NINJA_STATUS='[%f/%t %es] ' $(BIN)/cmake --build build/editable
+	@$(PIP) install --no-build-isolation --no-deps --config-settings wheel.cmake=false --editable .
+	@sed -n 's/^TEXGS_LEFT_OUT:INTERNAL=\(..*\)/Left out: the CUDA library, \1. Compile it by: make install CUDA=1/p' build/editable/CMakeCache.txt
 	@touch $@
 
 # pip would compile the 23,000 modules one by one. Some packages hold files that are no Python.
