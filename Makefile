@@ -71,10 +71,11 @@ lint: $(VENV)/dependencies
 
 # CMake writes into the source tree, and remembers its options; pip has only to find what is there.
 CONFIGURE = $(BIN)/cmake -S . -B build/editable -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) \
-	-DPython_EXECUTABLE=$(abspath $(BIN)/python) $(if $(CUDA),-DTEXGS_CUDA=$(if $(filter 0,$(CUDA)),OFF,ON)) $(CMAKE_ARGS)
-$(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt texgs/core/native_sources.py $(NATIVE) $(if $(CUDA),again)
+	-DPython_EXECUTABLE=$(abspath $(BIN)/python) --log-level=WARNING \
+	$(if $(filter 1,$(CUDA)),-DTEXGS_CUDA=ON) $(if $(filter 0,$(CUDA)),-DTEXGS_CUDA=OFF) $(CMAKE_ARGS)
+$(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt texgs/core/native_sources.py $(NATIVE) $(if $(filter 0 1,$(CUDA)),again)
 	@echo "Compiling the native library: steps done, of all, and seconds"
-	@$(CONFIGURE) > build/editable.log || { cat build/editable.log; exit 1; }
+	@$(CONFIGURE)
 	@NINJA_STATUS='[%f/%t %es] ' $(BIN)/cmake --build build/editable
 	@$(PIP) install --no-build-isolation --no-deps --config-settings wheel.cmake=false --editable .
 	@sed -n 's/^TEXGS_LEFT_OUT:INTERNAL=\(..*\)/Left out: the CUDA library, \1. Compile it by: make install CUDA=1/p' build/editable/CMakeCache.txt
