@@ -36,12 +36,12 @@ def said(*command: str | Path) -> str:
 def main(folder: str) -> None:
     """Install into a virtual environment in the folder, and print what differs."""
     said(sys.executable, "-m", "venv", folder)
-    pip = [f"{folder}/bin/python", "-m", "pip", "--disable-pip-version-check", "--quiet"]
+    pip = [f"{folder}/bin/python", "-m", "pip", "--disable-pip-version-check"]
     index = said(sys.executable, ROOT / "tools" / "torch_index.py").split()
     newest = ["--upgrade", "--upgrade-strategy", "eager", "--no-compile"]
-    said(*pip, "install", *newest, *index, *wanted())
+    said(*pip, "install", "--quiet", *newest, *index, *wanted())
     here = ["--no-deps", "--no-build-isolation", "--config-settings", "wheel.cmake=false"]
-    said(*pip, "install", *here, "--editable", ROOT)
+    said(*pip, "install", "--quiet", *here, "--editable", ROOT)
     locked = versions("".join((ROOT / name).read_text(encoding="utf-8") for name in LOCKS))
     now = versions(said(*pip, "list", "--format=freeze"))
     changed = {
