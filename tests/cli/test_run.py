@@ -240,6 +240,7 @@ def test_a_run_for_one_target_names_no_report(tmp_path):
 def runs(tmp_path_factory):
     """Errors of a run whose second job fails, and those of the same with `--verbose`; the folder."""
     folder = tmp_path_factory.mktemp("runs")
+    (folder / "conf").mkdir()
     (folder / "results/turbulence/transfer").mkdir(parents=True)
     (folder / "results/turbulence/transfer/mine.txt").touch()
     words = ["run", "--cores", "1", "tracking=none", *TINY.split(), "volumes"]
