@@ -137,14 +137,14 @@ def _lines(iterable: Iterable[T], total: int | None, title: str, unit: str) -> I
             done += 1
             now = monotonic()
             if now - last >= SECONDS_BETWEEN_LINES and done != total:
-                left = f", {_duration((total - done) * (now - start) / done)} left" if total else ""
+                left = f", {duration((total - done) * (now - start) / done)} left" if total else ""
                 print(f"{title}: {_state(done, total, unit, now - start)}{left}", file=sys.stderr, flush=True)
                 last = now
         outcome = "took"
     finally:
         seconds = monotonic() - start
         if done or outcome != "took":  # else there was nothing to do
-            state = f"{_state(done, total, unit, seconds)}, {outcome} {_duration(seconds)}"
+            state = f"{_state(done, total, unit, seconds)}, {outcome} {duration(seconds)}"
             print(f"{title}: {state}", file=sys.stderr, flush=True)
 
 
@@ -158,7 +158,7 @@ def _state(done: int, total: int | None, unit: str, seconds: float) -> str:
     return f"{count}, {rate:.1f} {unit}/s" if rate >= 1 else f"{count}, {1 / rate:.1f} s/{unit}"
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
     """Return a time in its two largest units: "10 s", "3 min 05 s", "2 h 07 min"."""
     whole = round(max(seconds, 0))
     if whole < 60:

@@ -17,6 +17,7 @@ from texgs.workflow.stages.settings import FitLabel, OfVolume
 if TYPE_CHECKING:
     from texgs.scene.scene import SceneVolume
 
+SCENE_WORDS = "The scene as fitted."
 AZIMUTH, POLAR = -60.0, 20.0  # of the picture, degrees
 
 
@@ -34,7 +35,7 @@ class Settings(OfVolume):
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
-    """Write scene.yaml, in which nothing is edited, and scene.png.
+    """Write scene.yaml, in which nothing is edited, scene.png, and where there is a volume volume.png.
 
     It reads model.safetensors of each basic TF, and `volume`, the volume.nrrd, where there is one.
     """
@@ -44,6 +45,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.scene.frame import frame
     from texgs.scene.scene import Scene, SceneModel
     from texgs.scene.scene_file import write_scene
+    from texgs.scene.twin import Twin
     from texgs.volume.framing import frame_of
 
     models = {
@@ -58,9 +60,13 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     write_scene(output / SCENE, scene)
     composition = scene.open(torch_device(settings.fit.device))
     camera = orbit(AZIMUTH, POLAR, *scene.framed(composition).lens(settings.fov_y).square(settings.image))
-    picture = frame(composition, camera, scene)
-    write_frames(output / "scene.png", [picture])
-    return Outcome(SceneResult(len(scene.models), len(composition)))
+    pictures = {"scene.png": SCENE_WORDS}
+    write_frames(output / "scene.png", [frame(composition, camera, scene)])
+    if scene.volume is not None:
+        pictures["volume.png"] = "The volume, by ray casting."
+        truth = frame(composition, camera, scene, "volume", Twin(scene, composition.device))
+        write_frames(output / "volume.png", [truth])
+    return Outcome(SceneResult(len(scene.models), len(composition)), pictures)
 
 
 def volume_of(settings: Settings, volume: Path) -> SceneVolume:
@@ -84,7 +90,7 @@ STAGE = Stage(
         (SCENE, "scene.png"),
         target="scenes",
         gpu=("fit",),
-        shown={"scene.png": "The basic models as one scene, rendered from their primitives."},
+        shown={"scene.png": SCENE_WORDS},
     ),
     inputs=models_and_volume,
     work=work,
