@@ -63,6 +63,11 @@ def intended_dataset(record: Record[Any]) -> str:
     return record.stand_in.replace(" ", "_") or record.dataset
 
 
+def are_of_paper(records: Iterable[Record[Any]]) -> bool:
+    """Return whether some jobs are of the paper's data sets, or of stand-ins for them."""
+    return any(intended_dataset(record) in volumes() for record in records)
+
+
 def in_order(records: Iterable[R]) -> list[R]:
     """Return records sorted by data set, basic TF and label."""
     return sorted(records, key=lambda record: (rank(record), record.tf or "", record.label))
@@ -129,7 +134,13 @@ def beside_paper(
     names = [*map(Column, (DATA, LABEL, *keys.values())), SCENES]
     published = [Column(each.title + PAPER, each.digits, UNPUBLISHED_CELL) for each in columns.values()]
     shown = side_by_side(ours, theirs, ("published", *keys.values()), titles)
-    return Table(COMPARED_FACTS, [*names, *columns.values(), *published], shown)
+    words = COMPARED_FACTS if has_papers(ours) else ""
+    return Table(words, [*names, *columns.values(), *published], shown)
+
+
+def has_papers(rows: DataFrame) -> bool:
+    """Return whether any row is of a data set of the paper's, or a stand-in for one."""
+    return any(place < len(volumes()) for place, _, _ in rows["rank"])
 
 
 def grouped(rows: Rows, keys: Sequence[str], titles: Sequence[str], is_sum: bool) -> DataFrame:
@@ -162,7 +173,7 @@ def side_by_side(ours: DataFrame, theirs: DataFrame, keys: Sequence[str], titles
     for title in titles:
         cell = rows[title + PAPER]
         rows[title + PAPER] = cell.mask(~is_alike & cell.notna(), UNLIKE_CELL)
-    if any(place < len(volumes()) for place, _, _ in rows["rank"]):
+    if has_papers(rows):
         shown = set(rows.loc[is_alike, list(keys)].itertuples(index=False, name=None))
         is_left = [key not in shown for key in theirs[published].itertuples(index=False, name=None)]
         left = theirs[is_left]
