@@ -8,8 +8,8 @@ Color = tuple[float, float, float]  # red, green, blue in [0, 1]
 
 def color(name: str, value: object) -> Color:
     """Return red, green, blue of three numbers, "#ffd27f" or a name of CSS; errors begin with `name`."""
-    found = channels(value) if isinstance(value, str) else value
-    numbers = found if isinstance(found, list | tuple) else ()
+    given = channels(value) if isinstance(value, str) else value
+    numbers = given if isinstance(given, list | tuple) else ()
     if len(numbers) != 3 or not all(is_number(x) and 0 <= x <= 1 for x in numbers):
         from PIL import ImageColor
 

@@ -126,8 +126,8 @@ def view_mask(model: Surfels, clicks: Clicks, masks: MaskModel, light: Light) ->
     is_shown = shown.alpha >= FAINT
     held = None if clicks.held is None else clicks.held[part] & is_shown
     if held is not None or bool(clicks.positive[inside].any()):
-        found = masks(image, moved[inside], clicks.positive[inside], held, is_shown)
-        mask[part] = found & (is_shown if held is None else held)
+        chosen = masks(image, moved[inside], clicks.positive[inside], held, is_shown)
+        mask[part] = chosen & (is_shown if held is None else held)
     return mask
 
 

@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from texgs.core.errors import ArgumentError
+from texgs.core.keys import require_keys
 from texgs.core.names import EXPORTS
 from texgs.fields.files import kind_of
+from texgs.fields.part_edit import EDIT_KEYS
 from texgs.scene import export_keys
 from texgs.scene.film import Film
 from texgs.scene.keyframes import KEPT, keyed_shots
 from texgs.scene.scene import Scene
-from texgs.scene.scene_file import EDIT_KEYS, require_keys
 from texgs.scene.session import SCENE_KEYS
 from texgs.viewer import PAGE_VOLUME
 from texgs.viewer.export import export
