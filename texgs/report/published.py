@@ -134,8 +134,7 @@ def beside_paper(
     names = [*map(Column, (DATA, LABEL, *keys.values())), SCENES]
     published = [Column(each.title + PAPER, each.digits, UNPUBLISHED_CELL) for each in columns.values()]
     shown = side_by_side(ours, theirs, ("published", *keys.values()), titles)
-    words = COMPARED_FACTS if has_papers(ours) else ""
-    return Table(words, [*names, *columns.values(), *published], shown)
+    return Table(COMPARED_FACTS if has_papers(ours) else "", [*names, *columns.values(), *published], shown)
 
 
 def has_papers(rows: DataFrame) -> bool:
