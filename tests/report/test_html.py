@@ -190,7 +190,7 @@ def test_the_scene_as_fitted_comes_first_and_recipes_are_named_where_there_are_t
     assert document.of("b") == ["as fitted", "crimson", "glass"]
     captions = [text for text in document.of("figcaption") if text.startswith(": ")]
     assert captions[0] == ": Words of poster.png."
-    assert captions[2] == ": The picture: panes."
+    assert captions[2] == ": It follows: panes."
     other = job(folder, "pse", PseResult(6, [], []), ["pse.png"], recipe="other")
     assert {"quick as fitted", "other"} < set(page(tmp_path, [*paths, other]).of("b"))
 

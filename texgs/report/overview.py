@@ -45,13 +45,13 @@ def overviews_of(records: Sequence[Record[Any]], pictures: Sequence[Figure]) -> 
 
 def what(records: Sequence[Record[Any]], scene: Record[SceneResult] | None) -> str:
     """Describe the data, the scene and its edits."""
-    functions = listed({record.tf for record in records if record.tf})
+    functions = ", ".join(sorted({record.tf for record in records if record.tf}))
     volumes = [" × ".join(map(str, record.result.dims)) for record in of(VolumeResult, records)]
     words = f"A volume of {volumes[0]} samples" if volumes else "Views"
     words += f", shown by {functions}" if functions else ""
     if scene is not None:
         words += f", as a scene of {scene.result.primitives:,} {scene.field}"
-    edits = listed({record.result.edit for record in of(EditResult, records)})
+    edits = ", ".join(sorted({record.result.edit for record in of(EditResult, records)}))
     return f"{words}{f', with the edits {edits}' if edits else ''}."
 
 
@@ -63,10 +63,11 @@ def quality(records: Sequence[Record[Any]]) -> str:
         return ""
     level, (worst, least) = fmean(levels.values()), min(levels.items(), key=itemgetter(1))
     shown = min(each.shown or 0.0 for tf, each in ends.items() if tf in levels)
+    spread = f"; {worst} has the least with {least:.1f} dB" if len(levels) > 1 else ""
     return (
         "In test views, which no fit has seen, colours on the object are off by about "
-        f"{100 * 10 ** (-level / 20):.1f} % of full brightness ({level:.1f} dB; {worst} has the least with "
-        f"{least:.1f} dB). {'Nothing is' if shown >= WHOLE_SHARE else 'Parts are'} missing: "
+        f"{100 * 10 ** (-level / 20):.1f} % of full brightness ({level:.1f} dB{spread}). "
+        f"{'Nothing is' if shown >= WHOLE_SHARE else 'Parts are'} missing: "
         f"the scene shows {100 * shown:.1f} % of what is there."
     )
 
@@ -75,10 +76,5 @@ def time(records: Sequence[Record[Any]]) -> str:
     """Describe the wall-clock time of all jobs, that of fits, and the devices."""
     spent = sum(record.facts.get("seconds") or 0 for record in records)
     fits = sum(record.result.fit_seconds for record in of(FitResult, records))
-    devices = listed({str(record.facts["device"]) for record in records if record.facts.get("device")})
+    devices = ", ".join(sorted({str(record.facts.get("device", "")) for record in records} - {""}))
     return f"All jobs took {duration(spent)}, added up, {duration(fits)} of it for fits, on {devices}."
-
-
-def listed(names: set[str]) -> str:
-    """Return names in order."""
-    return ", ".join(sorted(names))
