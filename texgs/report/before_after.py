@@ -8,12 +8,12 @@ import numpy as np
 import torch
 
 from texgs.core.figures import new_figure, words, write_figure, write_grid
-from texgs.core.lens import Lens
+from texgs.core.lens import SIGHTS, Lens
 from texgs.core.progress import progress
 from texgs.fields.kinds import Kind
 from texgs.scene.film import Film, frames_of
 from texgs.scene.scene import Scene
-from texgs.volume.cameras import SIGHTS, sights
+from texgs.volume.cameras import sights
 
 SIDE_LIGHT = (-30.0, 40.0)  # azimuth and polar angle of a light that no edit has seen, degrees
 SIZE = 512  # pixels of a picture

@@ -6,7 +6,7 @@ from operator import itemgetter
 from statistics import fmean
 from typing import Any
 
-from texgs.core.progress import duration
+from texgs.core.progress import time_text
 from texgs.metrics.quality import WHOLE_SHARE
 from texgs.report.fit_tables import end_of, runs_of
 from texgs.report.metrics_files import Record, of
@@ -77,4 +77,4 @@ def time(records: Sequence[Record[Any]]) -> str:
     spent = sum(record.facts.get("seconds") or 0 for record in records)
     fits = sum(record.result.fit_seconds for record in of(FitResult, records))
     devices = ", ".join(sorted({str(record.facts.get("device", "")) for record in records} - {""}))
-    return f"All jobs took {duration(spent)}, added up, {duration(fits)} of it for fits, on {devices}."
+    return f"All jobs took {time_text(spent)}, added up, {time_text(fits)} of it for fits, on {devices}."

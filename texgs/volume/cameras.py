@@ -10,14 +10,10 @@ import torch
 
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
-from texgs.core.lens import Lens, frequency_of
+from texgs.core.lens import FRONT, SIGHTS, Lens, frequency_of
 
 POLE = 89.99  # degrees; the paper's views stop short of the poles, so that +y is up in every one of them
 T = TypeVar("T")
-FRONT = -90.0  # azimuth of +z, degrees
-# Azimuth and polar angle of three views that are far apart, degrees. Their heights differ, too: what is round
-# about +y looks alike from all sides.
-SIGHTS = {"front": (FRONT, 20.0), "below": (30.0, -30.0), "above": (150.0, 50.0)}
 
 
 def icosphere(frequency: int, lens: Lens) -> list[Camera]:

@@ -10,9 +10,9 @@ from texgs.config.gallery import NO_EDIT, GalleryCell, GalleryRow, Grid, GridKey
 from texgs.config.project import members
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
+from texgs.core.lens import SIGHTS
 from texgs.core.names import close
 from texgs.edit.method import NO_METHOD, method_of
-from texgs.volume.cameras import SIGHTS
 from texgs.workflow.edits import chain_of
 from texgs.workflow.inputs import prepared_volume, sibling, with_recipe
 from texgs.workflow.stage import edit_folder, fit_folder, result_file

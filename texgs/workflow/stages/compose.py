@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from texgs.scene.scene import SceneVolume
 
 SCENE_WORDS = "The scene as fitted."
-AZIMUTH, POLAR = -60.0, 20.0  # of the picture, degrees
 
 
 @dataclass(kw_only=True)
@@ -39,12 +38,12 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     It reads model.safetensors of each basic TF, and `volume`, the volume.nrrd, where there is one.
     """
-    from texgs.core.camera import orbit
     from texgs.core.check import torch_device
     from texgs.core.movie import write_frames
     from texgs.scene.frame import frame
     from texgs.scene.scene import Scene, SceneModel
     from texgs.scene.scene_file import write_scene
+    from texgs.scene.shot import Shot
     from texgs.scene.twin import Twin
     from texgs.volume.framing import frame_of
 
@@ -59,8 +58,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         scene = replace(scene, frame=frame_of(grid, framing), space=grid.world)
     write_scene(output / SCENE, scene)
     composition = scene.open(torch_device(settings.fit.device))
-    camera = orbit(AZIMUTH, POLAR, *scene.framed(composition).lens(settings.fov_y).square(settings.image))
-    pictures = {"scene.png": SCENE_WORDS}
+    shot = Shot(width=settings.image, fov_y=settings.fov_y)
+    camera, pictures = shot.camera(scene.framed(composition)), {"scene.png": SCENE_WORDS}
     write_frames(output / "scene.png", [frame(composition, camera, scene)])
     if scene.volume is not None:
         pictures["volume.png"] = "The volume, by ray casting."
