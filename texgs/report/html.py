@@ -33,7 +33,6 @@ JOB_FACTS = (
     "device",
 )
 SOURCE_FACTS = ("config_sha", "code_sha", "git_sha", "run")
-MANY = 4  # data sets that the title does not name
 LOSS_CAPTION = "Loss of single views while fields were fitted."
 SWEEP_CAPTION = (
     "Means over seeds with their standard deviation, of what differs; below them the edited scenes."
@@ -62,9 +61,9 @@ def write_report(
         pictures[section] += own
     overviews = overviews_of(records, pictures.pop("overview"))
     shown = [*chain(*pictures.values()), *chain(*(each.figures for each in overviews))]
-    titles, folder = [each.title for each in overviews], Path(path).resolve().parent
+    folder = Path(path).resolve().parent
     text = environment.from_string(template).render(
-        title=", ".join(titles) if len(titles) < MANY else f"{len(titles)} data sets",
+        title=", ".join(each.title for each in overviews),
         overviews=overviews,
         held=held_pages(shown),
         link=lambda page: quote(Path(os.path.relpath(page, folder)).as_posix()),

@@ -19,11 +19,6 @@ R = TypeVar("R", bound=Record[Any])
 PAPER_LABEL = "the paper"  # recipe in rows of the paper
 RECIPE = "paper"  # file of conf/fit with results comparable to the paper's
 VIEWS = 162  # default number of training views in the paper
-COMPARED_FACTS = (
-    "Numbers of the paper stand beside ours where recipe, size of images and number of training views are "
-    f"the paper's; elsewhere there is {UNLIKE_CELL}, not like for like. Its transfer functions are not "
-    "published: even there scenes differ, so that PSNR, SSIM and primitives are not like for like."
-)
 DATA, LABEL = "data set", "recipe"  # titles of columns
 # Size and number of views, and changes of the recipe, in rows: means are over fits of the same.
 VIEWS_COLUMN = "seen"
@@ -134,13 +129,7 @@ def beside_paper(
     names = [*map(Column, (DATA, LABEL, *keys.values())), SCENES]
     published = [Column(each.title + PAPER, each.digits, UNPUBLISHED_CELL) for each in columns.values()]
     shown = side_by_side(ours, theirs, ("published", *keys.values()), titles)
-    words = COMPARED_FACTS if has_papers(ours) else ""
-    return Table(words, [*names, *columns.values(), *published], shown)
-
-
-def has_papers(rows: DataFrame) -> bool:
-    """Return whether any row is of a data set of the paper's, or a stand-in for one."""
-    return any(place < len(volumes()) for place, _, _ in rows["rank"])
+    return Table("", [*names, *columns.values(), *published], shown)
 
 
 def grouped(rows: Rows, keys: Sequence[str], titles: Sequence[str], is_sum: bool) -> DataFrame:
@@ -173,7 +162,7 @@ def side_by_side(ours: DataFrame, theirs: DataFrame, keys: Sequence[str], titles
     for title in titles:
         cell = rows[title + PAPER]
         rows[title + PAPER] = cell.mask(~is_alike & cell.notna(), UNLIKE_CELL)
-    if has_papers(rows):
+    if any(place < len(volumes()) for place, _, _ in rows["rank"]):
         shown = set(rows.loc[is_alike, list(keys)].itertuples(index=False, name=None))
         is_left = [key not in shown for key in theirs[published].itertuples(index=False, name=None)]
         left = theirs[is_left]

@@ -38,8 +38,6 @@ def datasets(records: Iterable[Record[Any]]) -> Table:
         "views. Where there is no volume, the views are as published."
     )
     records = list(records)
-    if are_of_paper(records):
-        caption += " The paper: ParaView on an RTX 4090, its volumes as 32-bit floats."
     own = {record.dataset: record for record in of(VolumeResult, records)}
     rendered: list[Record[Any]] = [each for each in of(ViewsResult, records) if not is_of_sweep(each)]
     known = {record.dataset for record in rendered}

@@ -3,7 +3,7 @@
 import base64
 import io
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -49,18 +49,12 @@ def figures(records: Sequence[Record[Any]]) -> dict[str, list[Figure]]:
         is_of_all = isinstance(record.result, GalleryResult) or not record.is_swept
         for name, words in record.facts.get("pictures", {}).items() if is_of_all else ():
             file = record.path.with_name(name)
-            if isinstance(record.result, PageResult):
-                words = shown_words(edits.get((record.dataset, record.label, record.result.edit)), words)
+            edit = edits.get((record.dataset, record.label, edit_of(record)))
+            if edit and edit.followed and isinstance(record.result, PageResult):
+                words = f"It follows: {words_of(edit.followed)}."
             if file.is_file() and (figure := figure_of(record, file, words, has_one)):
                 by_section[section_of(record, file)].append(figure)
     return by_section
-
-
-def shown_words(edit: EditResult | None, words: str) -> str:
-    """Return the picture or the instruction that a scene's edit follows, or else some words."""
-    if edit is None or not edit.followed:
-        return words
-    return f"{'The picture' if edit.follows == 'style' else 'The instruction'}: {words_of(edit.followed)}."
 
 
 def figure_of(record: Record[Any], file: Path, words: str, has_one: bool) -> Figure | None:
@@ -75,9 +69,8 @@ def figure_of(record: Record[Any], file: Path, words: str, has_one: bool) -> Fig
     return Figure(record.title, label(record, has_one), words, uri, command, is_narrow, own)
 
 
-def held_pages(shown: Iterable[Figure]) -> dict[Path, str]:
+def held_pages(shown: Sequence[Figure]) -> dict[Path, str]:
     """Return the pages that a report with some figures holds, as JSON by file: the smallest, to `MAILED`."""
-    shown = list(shown)
     room, held = MAILED - sum(len(figure.uri) for figure in shown), dict[Path, str]()
     pages = [figure.page for figure in shown if figure.page]
     for page in sorted(pages, key=lambda page: page.stat().st_size):

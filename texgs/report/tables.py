@@ -12,7 +12,13 @@ from texgs.report.published import are_of_paper
 from texgs.report.results import EditResult, FitResult
 from texgs.report.scene_tables import datasets, edits, rendering, steps
 from texgs.report.sweep_table import sweep
-from texgs.report.table import PAPER, Table, tables_file
+from texgs.report.table import PAPER, UNLIKE_CELL, Table, tables_file
+
+COMPARED_FACTS = (
+    "Numbers of the paper stand beside ours where recipe, size of images and number of training views are "
+    f"the paper's; elsewhere there is {UNLIKE_CELL}, not like for like. Its transfer functions are not "
+    "published: even there scenes differ, so that PSNR, SSIM and primitives are not like for like."
+)
 
 
 @dataclass(frozen=True)
@@ -26,7 +32,7 @@ class TableSpec:
     make: Callable[[Sequence[Record[Any]]], Table] | None  # None: supplied by the caller
     caption: str = ""
     number: str = ""  # in the paper, with A in its appendix; "" for other tables
-    paper: str = ""  # further content of the paper's table
+    paper: str = ""  # sentences on the paper's table
 
     def table(
         self, records: Sequence[Record[Any]], left_out: Sequence[LeftOut] = (), given: Table | None = None
@@ -39,7 +45,7 @@ class TableSpec:
         heading, where = self.title, ""
         if are_of_paper(records):
             heading += f" (Table {self.number} of the paper)" if self.number else ""
-            where = f"In the paper: {self.paper}." if self.paper else ""
+            where = self.paper or COMPARED_FACTS * any(each.title.endswith(PAPER) for each in made.columns)
         parts = (self.caption, where, made.caption, note(left_out, self.places))
         shown = [each for each in made.columns if not each.title.endswith(PAPER) or made.has(each.title)]
         return replace(made, columns=shown, heading=heading, caption=" ".join(filter(None, parts)))
