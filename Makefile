@@ -7,7 +7,7 @@ unexport PYTHONDONTWRITEBYTECODE # tests and jobs start hundreds of processes
 NATIVE := $(shell find texgs/raster/csrc -name '*.h' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh' -o -name '*.txt')
 FORMATTED := $(filter-out %.txt,$(NATIVE)) $(shell find tests -name '*.h' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh')
 
-.PHONY: help install test test-all test-cpus test-cluster bench lint demo lock clean
+.PHONY: help install again test test-all test-cpus test-cluster bench lint demo lock newest cross clean
 
 help:
 	@echo "make demo      from a small generated volume to an edited scene and results/report.html"
@@ -17,10 +17,12 @@ help:
 	@echo "make test-cluster  run the cluster profile on a real SLURM on this machine, where that is installed"
 	@echo "make bench     measure speed and memory, write JSON under benchmarks/"
 	@echo "make lint      ruff, mypy, clang-format, snakefmt, snakemake --lint and the import layers"
-	@echo "make install   compile what has changed and install it, without running anything"
+	@echo "make install   compile what has changed and install it, without running anything; CUDA=1: for GPUs, too"
+	@echo "make cross     compile for aarch64 by GCC and clang, and test the rasterizer there under emulation"
 	@echo "make lock      resolve requirements.lock anew"
+	@echo "make newest    test with the newest releases of all packages, in an environment of its own"
 	@echo "make clean     remove the environment and everything built"
-	@echo "The first of them creates $(VENV) with $(PYTHON) (3.11 to 3.13) and compiles the native library."
+	@echo "The first of them creates $(VENV) with $(PYTHON) (3.11 to 3.14) and compiles the native library."
 
 install: $(VENV)/installed
 	@echo "texgs is installed in $(VENV). Next: source $(BIN)/activate, and then texgs doctor or make demo."
@@ -55,7 +57,7 @@ bench: $(VENV)/installed
 	OMP_PROC_BIND=true $(BIN)/python -m benchmarks $(ARGS)
 
 demo: $(VENV)/installed
-	$(BIN)/snakemake --workflow-profile workflow/profiles/local --config experiment=demo $(ARGS)
+	$(BIN)/texgs run experiment=demo $(ARGS)
 
 lint: $(VENV)/dependencies
 	$(BIN)/ruff check .
@@ -67,10 +69,16 @@ lint: $(VENV)/dependencies
 	$(BIN)/snakemake --lint
 	$(BIN)/python -m pytest tests/test_layers.py
 
-# Not quiet: pip says every minute that it is still at work.
-$(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt texgs/core/native_sources.py $(NATIVE)
-	@echo "Compiling the native library (some minutes on two cores, with CUDA twice as many) and installing texgs"
-	@$(PIP) --verbose install --no-build-isolation --no-deps --editable .
+# CMake writes into the source tree, and remembers its options; pip has only to find what is there.
+CONFIGURE = $(BIN)/cmake -S . -B build/editable -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) \
+	-DPython_EXECUTABLE=$(abspath $(BIN)/python) --log-level=WARNING \
+	$(if $(filter 1,$(CUDA)),-DTEXGS_CUDA=ON) $(if $(filter 0,$(CUDA)),-DTEXGS_CUDA=OFF) $(CMAKE_ARGS)
+$(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt texgs/core/native_sources.py $(NATIVE) $(if $(filter 0 1,$(CUDA)),again)
+	@echo "Compiling the native library: steps done, of all, and seconds"
+	@$(CONFIGURE)
+	@NINJA_STATUS='[%f/%t %es] ' $(BIN)/cmake --build build/editable
+	@$(PIP) install --no-build-isolation --no-deps --config-settings wheel.cmake=false --editable .
+	@sed -n 's/^TEXGS_LEFT_OUT:INTERNAL=\(..*\)/Left out: the CUDA library, \1. Compile it by: make install CUDA=1/p' build/editable/CMakeCache.txt
 	@touch $@
 
 # pip would compile the 23,000 modules one by one. Some packages hold files that are no Python.
@@ -92,6 +100,18 @@ lock: $(VENV)/dependencies
 	@$(PIP) install --no-compile --no-deps --require-hashes --requirement requirements.lock
 	@$(BIN)/python tools/licences.py > docs/licences.md
 	@echo "Wrote requirements.lock and docs/licences.md"
+
+# Bounds of pyproject.toml are ignored: this shows what raising them would break.
+newest: $(VENV)/installed
+	@$(BIN)/python tools/newest.py build/newest
+ifdef ARGS
+	build/newest/bin/python -m pytest $(ARGS)
+else
+	$(subst $(BIN),build/newest/bin,$(WORKERS)) -m "not ($(SLOW))"
+endif
+
+cross: $(VENV)/dependencies
+	@BIN=$(BIN) tools/cross.sh
 
 clean:
 	rm -rf $(VENV) build dist texgs/raster/_native .hypothesis .mypy_cache .pytest_cache .ruff_cache

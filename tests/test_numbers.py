@@ -37,7 +37,7 @@ ELSEWHERE = {  # page: numbers that are of no measurement, and what they are of
         *(f"{size} GB" for size in (2.6, 1.7, 4.3, 12.6, 16.0, 57.7)),
     },
     "report.md": {"95 %"},  # an interval
-    "workflow.md": {"4 MiB", "16 GB", "24 GB", "3 MB"},  # conf, the profile of SLURM, a file of others
+    "workflow.md": {"16 GB", "24 GB", "3 MB"},  # the profile of SLURM, a file of others
 }
 NUMBER = r"(?<![\w.#-])\d[\d,]*(?:\.\d+)?"
 CLAIM = re.compile(rf"({NUMBER})(?: (?:to|and|\+) ({NUMBER}))? ?({'|'.join(SCALES)})(?!\w)")

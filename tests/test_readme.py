@@ -26,7 +26,7 @@ from texgs.cli.main import STAGE_VERBS, VERBS, main, parse
 from texgs.config.compose import compose
 
 ROOT = Path(__file__).parents[1]
-USED = ("usage", "data", "fits", "scenes", "looks", "workflow", "api")
+USED = ("usage", "figure", "data", "fits", "scenes", "looks", "workflow", "api")
 PAGES = ("README.md", *(f"docs/{name}.md" for name in USED))
 OTHERS = {path.relative_to(ROOT).as_posix() for path in [ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md")]}
 ALL = (*PAGES, *sorted(OTHERS - set(PAGES)))  # later pages use what earlier ones wrote
@@ -46,7 +46,6 @@ INSTEAD = (
     (r"\./replicate", "", "it installs; test_the_script_without_parameters_runs_the_workflow reads it"),
     (r"texgs series ", "texgs series --help", "it needs files of steps; test_series.py has some"),
     (r"texgs (edit|render) steps/", "", "it needs such a series; test_series.py runs these verbs"),
-    (r"texgs export .*--kind points", "texgs {words} --opacity 0.05", "30 iterations leave surfels faint"),
     (r"texgs study", "texgs study --help", "it takes scenes of several methods"),
     (r"texgs view ", "texgs view --help", "it serves until it is interrupted"),
     (r"texgs votes", "texgs votes --help", "it takes votes of people"),
@@ -57,10 +56,12 @@ INSTEAD = (
     (r"texgs doctor --experiment paper", "texgs doctor --experiment demo", "it plans 1,000 jobs"),
     (r"texgs run experiment=paper ", "texgs run experiment=demo --dry-run", "it plans 1,000 jobs"),
     (r"texgs run dataset=vortex ", "texgs run {words} --dry-run", "its views have to be downloaded"),
-    (r"texgs run dataset=scan ", "texgs run {words} volumes sheets", "that of engine goes on to the report"),
+    (r"texgs run dataset=scan fit=quick$", "texgs run {words} sheets", "that of figure.md goes on"),
+    (r"texgs run dataset=scan .* views.width", "texgs run dataset=scan fit=quick", "its views are large"),
     (r"snakemake .*/profiles/local ", f"{PLAN} {{words}}", "texgs run runs the same workflow"),
     (r"snakemake .*/profiles/slurm ", f"{PLAN} --executor local --cores 1 {{words}}", "it needs a cluster"),
     (r"(ssh|git clone|tmux)( |$)", "", "it needs another machine"),
+    (r"ln -s ", "", "it would change the installation"),
 )
 
 
@@ -104,6 +105,8 @@ def project(tmp_path_factory):
     for name, samples in (("scan", values), ("ct", values), ("segmentation", labels)):
         nibabel.save(nibabel.Nifti1Image(samples, np.eye(4)), folder / f"{name}.nii.gz")
     SimpleITK.WriteImage(SimpleITK.GetImageFromArray(labels), folder / "segmentation.seg.nrrd")
+    (keys,) = (block for block in blocks("docs/scenes.md", "yaml") if "azimuth" in block)
+    (folder / "keys.yaml").write_text(keys)
     return folder
 
 
@@ -128,7 +131,7 @@ def small(words):
         return [verb, *(word for word in SMALL.split() if word.partition("=")[0] not in given), *rest]
     if verb == "render":
         rest = [word for word in rest if word not in ("--width", "1200")]
-        frames = ["--frames", "3"] if "--path" in rest else []
+        frames = ["--frames", "3"] if "--path" in rest else ["--fps", "1"] if "--film" in rest else []
         return [verb, *rest, "--width", "32", "--height", "32", *frames]
     if verb == "export" and "mesh" in rest:
         return [*words, "--voxel", "0.02"]

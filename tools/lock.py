@@ -12,7 +12,7 @@ from pathlib import Path
 TORCH_FILE = "requirements-torch.lock"
 EXTRAS = ("dev", "bench", "models")
 HEADER = f"""\
-# Versions that `make test` installs and tests with, for Python 3.11 to 3.13, and the hashes of their files.
+# Versions that `make test` installs and tests with, for Python 3.11 to 3.14, and the hashes of their files.
 # Written by `make lock`. torch: see {TORCH_FILE}.
 """
 

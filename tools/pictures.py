@@ -6,6 +6,8 @@ the paper's views, without which four pictures cannot be made (those of methods 
 there), and VGG-16 and a browser are needed for some.
 """
 
+import os
+import re
 import shlex
 import subprocess
 import sys
@@ -180,6 +182,26 @@ def viewer(run: Path) -> Image.Image:
     return Image.open(run / "viewer.png")
 
 
+def tooth(name: str) -> Callable[[Path], Image.Image]:
+    """Run the commands of docs/figure.md on a CT of a tooth, and take one of their pictures."""
+
+    def draw(_: Path) -> Image.Image:
+        project = RUNS / "figure" / "brain"
+        if not project.exists():
+            commands = re.findall(
+                r"^texgs .*", (DOCS / "figure.md").read_text(encoding="utf-8"), re.MULTILINE
+            )
+            scan = os.environ["TEXGS_DATA"] + "/tooth.nrrd"
+            for _program, *words in [shlex.split(each.replace("../scan.nii.gz", scan)) for each in commands]:
+                folder = project if project.exists() else project.parent
+                folder.mkdir(parents=True, exist_ok=True)
+                subprocess.run([PROGRAM, *words], check=True, cwd=folder)
+        picture = Image.open(project / name).convert("RGB")
+        return picture.reduce(picture.width // 800)
+
+    return draw
+
+
 class Picture(NamedTuple):
     """How a picture is made."""
 
@@ -210,6 +232,9 @@ PICTURES = {
     "hues": Picture(copy("orbital/gallery/hue/hue.png", smaller=2), "hue", f"{FIT} image gallery"),
     "slices": Picture(slices, "mni152", "volume texgs.volume.slice_picture"),
     "labels": Picture(labels, "2026-11-30-labels.csv"),
+    "figure_functions": Picture(tooth("results/scan/transfer/transfer.png"), "", "volume transfer"),
+    "figure_fitted": Picture(tooth("results/scan/scene/quick/compose/scene.png"), "", f"{FIT} compose"),
+    "figure_edited": Picture(tooth("figure.png"), "", f"{FIT} compose texgs.scene.exposure"),
     "viewer": Picture(viewer, "engine", f"{FIT} compose texgs.viewer.server"),
 }
 

@@ -67,6 +67,8 @@ def test_pictures_show_both(results):
         for name in files:
             picture = np.asarray(Image.open(results / "edits" / edit / name).convert("RGB"))
             assert picture.std() > 5, f"{edit}/{name} shows nothing"
+    told = json.loads((results / "edits" / "lobe" / "metrics.json").read_text())["pictures"]["edit.png"]
+    assert "only pieces that hold a click" in told, "else its mask shows more than the segment"
     assert (results / "edits" / "glass" / "turntable.mp4").stat().st_size > 1000
 
 
@@ -87,7 +89,7 @@ def test_looks_are_shown_side_by_side(results):
     folder = results.parents[1] / "gallery" / "looks"
     shown = [(each["row"], each["column"]) for each in numbers(folder)["shown"]]
     columns = ["volume", "as fitted", "glass", "gold"]
-    assert shown == [(row, column) for row in ("front", "side", "above") for column in columns]
+    assert shown == [(row, column) for row in ("front", "below", "above") for column in columns]
     assert np.asarray(Image.open(folder / "gallery.png").convert("RGB")).std() > 5
     looks = ("edits=[glass,gold]", "edit.looks=true", "dataset.looks={TF01: {}, TF02: {}}")
     assert main(["gallery", *WORDS, *FEW, *looks, "gallery.size=32", "gallery.name=given"]) == 0

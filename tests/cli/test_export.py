@@ -95,14 +95,22 @@ def test_textures_of_surfels_that_nobody_sees_are_dropped(tmp_path):
     assert not bool((sizes[50:] == 1).all())
 
 
-def test_points_of_a_scene(scene, tmp_path):
+def test_points_of_a_scene(scene, tmp_path, capsys):
+    assert export(scene, tmp_path / "all.ply", "--kind", "points") == 0
+    every = len(vertices(tmp_path / "all.ply"))
+    assert every == sum(len(ball(*of).parameters["opacities"]) for of in ((1,), (2, 80)))
+    assert "surfels" not in capsys.readouterr().err, "all are there"
     assert export(scene, tmp_path / "p.ply", "--kind", "points", "--opacity", "0.3") == 0
     points = vertices(tmp_path / "p.ply")
     counts = [
         int((scale * ball(*of).parameters["opacities"].sigmoid() >= 0.3).sum())
         for scale, of in ((1, (1,)), (0.5, (2, 80)))
     ]
-    assert len(points) == sum(counts)
+    assert len(points) == sum(counts) < every
+    assert (
+        f"p.ply: {len(points):,} of {every:,} surfels, those with an opacity of 0.3"
+        in capsys.readouterr().err
+    )
     reds = points[counts[0] :]
     assert reds["red"].mean() > 240 > 3 * reds["blue"].mean()
 

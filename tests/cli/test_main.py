@@ -16,7 +16,8 @@ def test_help_lists_every_verb(capsys):
         main(["--help"])
     assert stop.value.code == 0
     out = capsys.readouterr().out
-    assert all(verb in out for verb in VERBS)
+    assert all(f"\n  {verb} " in out for verb in VERBS)
+    assert out.index("  render ") < out.index("  texture ") < out.index("  edit_arf ")
     for verb in [*(set(VERBS) - set(STAGE_VERBS)), "views"]:
         with pytest.raises(SystemExit, match="0"):
             main([verb, "--help"])
@@ -60,6 +61,11 @@ def test_an_error_is_one_sentence_and_code_2(monkeypatch, capsys):
             ["render", "a", "--widht=9"],
             "texgs render: unrecognized arguments: --widht=9, did you mean --width?",
         ),
+        (
+            ["edit", "a", "--outptu", "b"],
+            "texgs edit: unrecognized arguments: --outptu, did",
+        ),
+        (["NEW"], "texgs NEW: no such verb, did you mean new?"),
         (["run", "--jobs"], "snakemake: argument --jobs/-j: expected one argument; see snakemake --help"),
         (["run", "--cores", "x"], "texgs run: Error parsing number of cores (--cores, -c): must be integer"),
     ],
@@ -81,6 +87,33 @@ def test_the_command_line_starts_without_heavy_imports():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
+
+
+MISTAKES = """
+rnu | render scene.yaml --flim a | view nowhere.yaml | edit scene.yaml TF01.opactiy=1 --output new.yaml
+render scene.yaml --mode nromal | export scene.yaml --kind mehs --to x.ply | check nowhere.yaml
+segment scene.yaml --name a --width 0 | study nowhere | report nowhere | views dataset=engin
+views views.widht=3 | run dataset=engin --dry-run | run fit=quick views.widht=3 al
+"""
+
+
+def test_mistakes_are_told_without_heavy_imports(tmp_path):
+    """Torch and Snakemake take a second each."""
+    (tmp_path / "scene.yaml").touch()
+    words = [line.split() for line in MISTAKES.replace("|", "\n").split("\n") if line]
+    code = f"""
+import sys
+from texgs.cli.main import main
+for words in {words}:
+    try:
+        code = main(words)
+    except SystemExit as end:
+        code = end.code
+    print(code, *({{'torch', 'snakemake', 'cv2', 'mlflow'}} & {{*sys.modules}}))
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True)
+    assert done.stdout.split("\n") == [*["2"] * len(words), ""], done.stderr
+    assert done.stderr.count("\n") == len(words)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """`texgs run`: which words are of the configuration and which of snakemake, exit codes, Ctrl-C."""
 
+import contextlib
 import errno
 import os
 import re
@@ -16,7 +17,7 @@ from snakemake.cli import parse_config
 from tests.refusals import refused
 from tests.workflow.project import TINY
 from texgs.cli.run import WORD, snakemake
-from texgs.cli.snakemake import overrides, place_errors
+from texgs.cli.snakemake import last_line, overrides, place_errors
 from texgs.core.errors import ArgumentError
 
 TEXGS = [sys.executable, "-m", "texgs.cli.main"]
@@ -98,6 +99,33 @@ def test_mistakes_end_with_2(tmp_path, words, message):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("dataset=lung fit=quick", "dataset=lung: this folder has no conf/, so it is no project: cd PROJECT"),
+        ("experiment=mine -n", "experiment=mine: this folder has no conf/"),
+        ("dataset=ENGINE", "got ENGINE, did you mean engine?"),
+        (f"dataset={'x' * 300}", "this folder has no conf/"),
+    ],
+)
+def test_a_mistake_outside_of_a_project_leaves_nothing(tmp_path, words, message):
+    done = texgs(tmp_path, "run", *words.split())
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert message in done.stderr
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.workflow
+def test_a_run_outside_of_a_project_says_so(tmp_path):
+    words = ["run", "-n", "tracking=none", *TINY.split(), "volumes", "tf=TF01"]
+    told = "texgs: this folder has no conf/, so it is no project: cd PROJECT, or start one"
+    assert told in texgs(tmp_path, *words).stderr
+    (tmp_path / "conf" / "dataset").mkdir(parents=True)
+    (tmp_path / "below").mkdir()
+    assert "no project" not in texgs(tmp_path, *words).stderr
+    assert f"cd {tmp_path}, or start one" in texgs(tmp_path / "below", "views", "dataset=lung").stderr
+
+
 @pytest.mark.workflow
 @pytest.mark.parametrize(
     ("place", "home"), [(".snakemake", ""), ("results/turbulence", ""), ("home", "home")]
@@ -157,8 +185,30 @@ def test_a_profile_of_another_program_is_named(tmp_path):
     (tmp_path / "config.yaml").write_text("executor: nowhere\n")
     done = texgs(tmp_path, "run", "-n", env={**os.environ, "SNAKEMAKE_PROFILE": str(tmp_path)})
     assert done.returncode == 2
-    told = f"snakemake: {tmp_path}: argument --executor/-e: invalid choice: 'nowhere'"
+    told = f"snakemake: {tmp_path} of SNAKEMAKE_PROFILE: argument --executor/-e: invalid choice: 'nowhere'"
     assert done.stderr.splitlines()[-1].startswith(told)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (
+            'Traceback (most recent call last):\n  File "a.py", line 3, in run\n    f()\n'
+            '  File "b.py", line 7, in f\n    x.y\n    ^^^\nAttributeError: no y\n',
+            "b.py, line 7: AttributeError: no y",
+        ),
+        (
+            "50 %\ntexgs views: views.width: expected at least 1, got 0\n\n",
+            "texgs views: views.width: expected at least 1, got 0",
+        ),
+        ("texgs views: interrupted; the same command goes on", ""),
+        ("", ""),
+    ],
+)
+def test_the_reason_of_a_failed_job_names_its_place(tmp_path, text, told):
+    (tmp_path / "log").write_text(text)
+    assert last_line(tmp_path / "log") == told
+    assert last_line(tmp_path / "none") == ""
 
 
 def test_a_user_without_a_home_folder_is_told_so(monkeypatch):
@@ -184,3 +234,50 @@ def test_a_run_for_one_target_names_no_report(tmp_path):
     assert done.returncode == 0, done.stderr
     assert "Done: what was asked for" in done.stdout
     assert "report.html" not in done.stdout
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Errors of a run whose second job fails, and those of the same with `--verbose`; the folder."""
+    folder = tmp_path_factory.mktemp("runs")
+    (folder / "conf").mkdir()
+    (folder / "results/turbulence/transfer").mkdir(parents=True)
+    (folder / "results/turbulence/transfer/mine.txt").touch()
+    words = ["run", "--cores", "1", "tracking=none", *TINY.split(), "volumes"]
+    return texgs(folder, *words), texgs(folder, *words, "--verbose"), folder, words
+
+
+@pytest.mark.workflow
+def test_without_a_terminal_there_are_plain_lines_and_errors_in_whole(runs):
+    plain, verbose, _, _ = runs
+    assert plain.returncode == verbose.returncode == 1
+    lines = [" ".join(line.split()) for line in plain.stderr.splitlines()]
+    assert lines[1:-2] == [
+        "volume turbulence started",
+        *(line for line in lines if line.startswith("1 of 2 volume turbulence ")),
+        "transfer turbulence started",
+    ]
+    assert lines[-2] == "failed transfer turbulence see results/logs/turbulence/transfer.log"
+    reason = verbose.stderr.splitlines()[-1]
+    assert lines[-1] == reason.strip()
+    assert "\x1b" not in plain.stderr
+    assert "rule transfer:" in verbose.stderr
+    assert "1 of 2 steps" not in plain.stderr
+
+
+@pytest.mark.workflow
+def test_a_terminal_gets_bars(runs):
+    _, _, folder, words = runs
+    main, other = os.openpty()
+    process = subprocess.Popen([*TEXGS, *words], cwd=folder, stdout=subprocess.PIPE, stderr=other)
+    os.close(other)
+    told = b""
+    with contextlib.suppress(OSError):  # how a terminal ends
+        while part := os.read(main, 4096):
+            told += part
+    os.close(main)
+    assert process.wait(100) == 1
+    assert b"all jobs" in told
+    assert b"0 of 1 jobs" in told
+    assert b"started" not in told
+    assert b"\x1b[?25h" in told, "the cursor is shown again"

@@ -36,8 +36,12 @@ def test_the_scene_has_all_models_and_a_picture(results):
     scene = read_scene(results / "compose" / "scene.yaml")
     assert list(scene.models) == ["TF01", "TF02"]
     assert len(scene.open()) == numbers(results / "compose")["primitives"]
-    picture = np.asarray(Image.open(results / "compose" / "scene.png"))
+    picture, truth = (
+        np.asarray(Image.open(results / "compose" / f"{name}.png").convert("RGB")).astype(float)
+        for name in ("scene", "volume")
+    )
     assert picture.min() < 200, "there is something to see"
+    assert abs(picture - truth).mean() < 0.5 * (255 - truth).mean(), "the volume is seen from the same side"
 
 
 def test_the_twin_of_the_scene_is_what_the_views_show(results):

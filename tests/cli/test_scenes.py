@@ -119,6 +119,14 @@ def test_a_film_has_so_many_seconds(scene, tmp_path):
         assert film.info["duration"] in (120, 130)
 
 
+def test_colours_have_names(scene):
+    assert edit(scene, "background=navy", "TF01.palette=red", "TF02.tint=Gold") == 0
+    edited = read_scene(scene.with_name("new.yaml"))
+    assert edited.background == (0, 0, 128 / 255)
+    assert edited.models["TF01"].edit.palette == (1, 0, 0)
+    assert edited.models["TF02"].edit.tint == (1, 215 / 255, 0)
+
+
 def test_a_transparent_picture_over_the_background_is_the_picture(scene, tmp_path):
     assert edit(scene, "background=#204060") == 0
     edited = scene.with_name("new.yaml")
@@ -192,7 +200,8 @@ def test_shadows_are_edits_that_can_be_taken_back(tmp_path):
         ("TF01.texture=foreign", "foreign: expected a texgs-"),
         ("TF01/x=foreign", "foreign: expected a texgs-"),
         ("TF01.file=gaussians.safetensors", "expected fields of one kind, got gaussians and surfels"),
-        ("TF01.opacity=[", "expected a number, true, false, r,g,b or #rrggbb"),
+        ("TF01.opacity=[", "expected a number, true, false, r,g,b, #rrggbb or a colour's name"),
+        ("TF01.palette=rde", "#rrggbb or the name of a colour, got 'rde', did you mean red?"),
         ("TF01.style=x.jpg", "a look by a picture or by words is learned: by texgs view, scene.style"),
         ("visible", "expected KEY=VALUE, such as TF01.opacity=0.5"),
     ],
@@ -208,7 +217,7 @@ def test_a_mistake_in_an_edit_writes_nothing(scene, tmp_path, monkeypatch, capsy
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--frames", "3", "--seconds", "2"], "frames: expected a number of frames or of seconds, got both"),
+        (["--frames", "3", "--seconds", "2"], "frames: expected a number of frames or of seconds, or keys"),
         (["--transparent"], "x.mp4: expected PNG for transparent pictures, got .mp4"),
         (["--transparent", "--caption"], "--transparent: expected neither --compare nor --caption"),
         (["--path", "orbit", "--output", "x.png"], "x.png: expected one frame, got 72; use .gif, .mp4 or"),

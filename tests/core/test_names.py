@@ -48,7 +48,13 @@ def test_names_labels_and_paths_that_are_taken():
 
 @pytest.mark.parametrize(
     ("word", "hint"),
-    [("z", ", did you mean +z or -z?"), ("opacitie", ", did you mean opacity?"), ("volume", "")],
+    [
+        ("z", ", did you mean +z or -z?"),
+        ("opacitie", ", did you mean opacity?"),
+        ("volume", ""),
+        ("LUNG-CT", ", did you mean lung_ct?"),
+        ("engine", ", did you mean Engine?"),
+    ],
 )
 def test_a_hint_names_what_is_most_like_a_word(word, hint):
-    assert close(word, ["+x", "-x", "+z", "-z", "opacity"]) == hint
+    assert close(word, ["+x", "-x", "+z", "-z", "opacity", "lung_ct", "Engine"]) == hint

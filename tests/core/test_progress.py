@@ -1,4 +1,5 @@
 import io
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -29,14 +30,15 @@ def log(capsys):
     return lambda: capsys.readouterr().err.splitlines()
 
 
-def test_log_file_gets_a_line_every_five_seconds_and_a_last_one(clock, log):
-    for _ in progress(range(92), title="views engine/TF01", unit="view"):
+def test_log_file_gets_lines_at_most_every_second_later_every_five_and_a_last_one(clock, log):
+    for _ in progress(range(160), title="views engine/TF01", unit="view"):
         clock[0] += 0.25
     lines = log()
-    assert lines[0] == "views engine/TF01: 20 of 92 views, 4.0 view/s, 18 s left"
-    assert lines[1] == "views engine/TF01: 40 of 92 views, 4.0 view/s, 13 s left"
-    assert lines[-1] == "views engine/TF01: 92 of 92 views, 4.0 view/s, took 23 s"
-    assert len(lines) == 5  # at 5, 10, 15, 20 s and the end
+    assert lines[0] == "views engine/TF01: 4 of 160 views, 4.0 view/s, 39 s left"
+    assert lines[-1] == "views engine/TF01: 160 of 160 views, 4.0 view/s, took 40 s"
+    assert all(re.search(module.LINE, line) for line in lines)
+    done = [int(re.search(r": (\d+) of", line)[1]) for line in lines]
+    assert done == [4, 8, 12, 16, 22, 30, 40, 54, 72, 92, 112, 132, 152, 160]
 
 
 class Place(list):
@@ -72,25 +74,26 @@ def test_slow_items_and_unknown_and_given_lengths(clock, log):
     for _ in progress((letter for letter in "abcd"), title="wait", unit="poll"):
         clock[0] += 3
     assert log() == [
-        *(f"wait: {n} polls, 3.0 s/poll" for n in (2, 4)),
+        "wait: 1 poll, 3.0 s/poll",
+        *(f"wait: {n} polls, 3.0 s/poll" for n in (2, 3, 4)),
         "wait: 4 polls, 3.0 s/poll, took 12 s",
     ]
     for _ in progress(iter("abc"), 3, title="a", unit="letter"):
-        clock[0] += 1
+        clock[0] += 0.3
     assert list(progress([], title="b", unit="view")) == []
     assert list(progress("a", title="c", unit="view")) == ["a"]
-    assert log() == ["a: 3 of 3 letters, 1.0 letter/s, took 3 s", "c: 1 of 1 view, took 0 s"]
+    assert log() == ["a: 3 of 3 letters, 3.3 letter/s, took 1 s", "c: 1 of 1 view, took 0 s"]
 
 
 def test_a_loop_left_early_says_how_far_it_came(clock, log):
     def fail():
         for index in progress(range(10), title="fit", unit="step"):
-            clock[0] += 1
+            clock[0] += 0.2
             if index == 4:
                 raise ValueError("NaN")
 
     refused(fail, "NaN", ValueError)
-    assert log() == ["fit: 4 of 10 steps, 1.2 s/step, stopped after 5 s"]
+    assert log() == ["fit: 4 of 10 steps, 4.0 step/s, stopped after 1 s"]
 
 
 def test_terminal_shows_a_bar(monkeypatch):

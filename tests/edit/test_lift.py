@@ -25,7 +25,7 @@ class Alike:
     def __init__(self):
         self.images, self.clicked = [], []
 
-    def __call__(self, image, points, positive, held=None):
+    def __call__(self, image, points, positive, held=None, shown=None):
         self.images.append(image)
         self.clicked.append((points, positive))
         if not len(points):
@@ -137,10 +137,27 @@ def test_the_mask_model_sees_what_the_view_shows_and_clicks_move_along(balls):
     assert (mask != expected).sum() <= 2
 
 
+def test_masks_end_where_the_model_shows_nothing(balls):
+    """Whatever the mask model says: in a view of opaque balls, on a white background and on an outline."""
+    model, _ = balls
+    alpha = model.render(FRONT).alpha
+    seen = []
+
+    def everything(image, points, positive, held, shown):
+        seen.append(shown)
+        return torch.ones(image.shape[:2], dtype=torch.bool)
+
+    mask = clicked_mask(model, clicks((-0.3, 0.0, 0.25)), everything)
+    assert torch.equal(mask, alpha >= 0.05)
+    assert int(seen[0].sum()) == int(mask.sum()), "the mask model is told what is shown"
+    outline = drawn(rectangle(-0.7, 0.0))
+    assert torch.equal(view_mask(model, outline, everything, HEADLIGHT), (alpha >= 0.05) & outline.held)
+
+
 def test_a_mask_that_contradicts_the_others_has_no_vote(balls):
     class Confused(Alike):
-        def __call__(self, image, points, positive, held=None):
-            right = super().__call__(image, points, positive, held)
+        def __call__(self, image, points, positive, held=None, shown=None):
+            right = super().__call__(image, points, positive, held, shown)
             return ~right if len(self.images) % 4 == 0 else right
 
     segment = lift(balls[0], clicks((-0.3, 0.0, 0.25)), cameras(), Confused())
@@ -200,7 +217,7 @@ def test_outlines_that_hold_nothing(outline, message):
 
 
 def test_nothing_selected_is_an_error(balls):
-    def blind(image, points, positive, held):
+    def blind(image, points, positive, held, shown):
         return torch.zeros(image.shape[:2], dtype=torch.bool)
 
     below = drawn(rectangle(-0.7, 0.7, top=-0.35))

@@ -39,10 +39,12 @@ from texgs.fields.surfels.step_file import at_step, write_step
 from texgs.fields.surfels.variants import with_texture, write_texture
 from texgs.fitting.checkpoint import latest
 from texgs.models.networks import read_tensors
+from texgs.scene.keyframes import read_keys
 from texgs.scene.scene import Scene, SceneModel, SceneSegment, SceneVolume
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.scene.series_file import Series, read_series, write_series
+from texgs.scene.shot import Shot
 from texgs.scene.twin import Twin
 from texgs.study.ballots import read_ballot
 from texgs.study.questions import read_key, write_key
@@ -151,6 +153,7 @@ def checkpoint(folder: Path) -> Path:
     return folder
 
 
+KEYS = [{"azimuth": -60, "cut": "x,0.2", "seconds": 1.5}, {"TF01.opacity": 0.2, "target": [0, 0, 1]}, {}]
 COMPACT = at("model.texgs", write_compact, sample())
 READERS: dict[str, Reader] = {
     **VOLUMES,
@@ -176,6 +179,7 @@ READERS: dict[str, Reader] = {
     ),
     "scene": Reader(scene, read_whole_scene),
     "scene of channels": Reader(partial(scene, channel=1), read_whole_scene),
+    "keys": Reader(at("keys.yaml", write_json, KEYS), lambda path: read_keys(str(path), Shot(), 25.0)),
     "volume of channels": Reader(partial(scene, channel=1), read_whole_scene, victim="volume.nrrd"),
     "data set": Reader(data_set, keep_function),
     "data set's metrics": Reader(data_set, keep_function, "results/mine/volume/metrics.json"),

@@ -1,8 +1,10 @@
 """Metrics that watch views: VGG-16 runs once a view; all views make what the definitions say."""
 
+import gc
 from dataclasses import replace
 from math import sqrt
 from statistics import fmean
+from weakref import ref
 
 import pytest
 import torch
@@ -69,6 +71,22 @@ def test_all_views_make_the_means_over_all_pairs_and_views(given, monkeypatch):
     nnfm, gram = map(fmean, zip(*(target.distances(some) for some in each if len(some)), strict=True))
     assert measured["style_nnfm"] == pytest.approx(nnfm, rel=1e-4)
     assert measured["style_gram"] == pytest.approx(gram, rel=1e-4)
+
+
+def test_the_networks_go_with_the_measured_scene(given):
+    """VGG-16 holds 280 MB with its Winograd weights; cycles would keep them until Python looks for cycles."""
+    gc.collect()
+    gc.disable()
+    try:
+        values_of(given)
+        network = ref(given.vgg)
+        del given.__dict__["vgg"]
+        assert network() is None
+        frames = ref(given.frame)
+        del given.__dict__["frame"]
+        assert frames() is None
+    finally:
+        gc.enable()
 
 
 @pytest.mark.parametrize("count", [1, 4, 12, 99])

@@ -9,7 +9,7 @@ from tests.real_data import real_data
 from tests.refusals import refused
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.models.masks import GrabCut, Remembered
-from texgs.models.sam import Sam, published_sam, sam_folder
+from texgs.models.sam import Sam, best_of, published_sam, sam_folder
 
 SIZE = 96
 
@@ -171,6 +171,28 @@ def test_one_click_has_the_best_of_several_masks_and_more_clicks_have_one():
     assert sizes == sorted(sizes)
     assert sizes[0] < sizes[2]
     assert int(stub(2)[0](image, *click((16, 16), (17, 17))).sum()) == sizes[0]
+
+
+def squares(*boxes):
+    return torch.stack([box(*each) for each in boxes])
+
+
+PART, WHOLE, AROUND = (30, 30, 50, 50), (20, 20, 70, 70), (0, 0, SIZE, SIZE)
+
+
+@pytest.mark.parametrize(
+    ("boxes", "quality", "shown", "best"),
+    [
+        ((PART, WHOLE, AROUND), (0.97, 1.01, 0.99), AROUND, 0),  # as good: the smallest
+        ((PART, WHOLE, AROUND), (0.7, 1.01, 0.99), AROUND, 1),  # the smallest is much worse
+        ((PART, WHOLE, AROUND), (0.4, 0.6, 1.0), WHOLE, 1),  # the best is mostly background
+        (((60, 60, 80, 80), WHOLE, AROUND), (1.0, 0.7, 0.6), AROUND, 1),  # the click is not on the best
+        ((PART, (0, 0, 0, 0), AROUND), (0.9, 1.0, 0.5), AROUND, 0),  # nothing is no object
+    ],
+)
+def test_of_several_masks_the_smallest_good_one_that_holds_the_click_is_taken(boxes, quality, shown, best):
+    masks, point = squares(*boxes), torch.tensor([[40, 40]])
+    assert torch.equal(best_of(masks, torch.tensor(quality), point, box(*shown)), masks[best])
 
 
 def test_an_image_is_encoded_once_for_all_clicks():

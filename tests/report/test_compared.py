@@ -19,7 +19,7 @@ from texgs.report.compared import SideBySide, compare_views, write_light_figure
 from texgs.scene.cut_view import cut_view, scene_and_fitted, scene_and_volume
 from texgs.scene.session import Session
 from texgs.scene.twin import Twin
-from texgs.volume.cameras import orbit_path
+from texgs.volume.cameras import sights
 
 CAMERA = orbit(20, 10, 4, 30, 48, 48)
 DARK = Light("directional", -60, 30, shadows=0.8, occlusion=0.6)
@@ -107,6 +107,6 @@ def test_the_light_from_the_side_of_an_edit_casts_the_shadows_of_its_scene(scene
     monkeypatch.setattr(before_after, "write_grid", lambda path, rows, titles: grids.append(rows))
     surfels = kinds()["surfels"]
     before_after.write_before_and_after(scene, scene, surfels, Lens(), tmp_path, torch.device("cpu"), "balls")
-    camera = orbit_path(3, before_after.POLAR, Lens().square(before_after.SIZE))[0]
+    camera = sights(Lens().square(before_after.SIZE))["front"]
     turned = replace(scene, light=DARK.turned(*before_after.SIDE_LIGHT))
     np.testing.assert_array_equal(grids[0]["after"][3], Session(turned).frame(camera))

@@ -13,6 +13,7 @@ from texgs.core.figures import Scale
 from texgs.core.image import write_png
 from texgs.fields.splats import GEOMETRY
 from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.shading import material
 from texgs.raster.shading import MATERIAL
 from texgs.report import fit_figure
@@ -26,6 +27,8 @@ from texgs.report.fit_figure import (
     write_comparison,
     write_fit_figure,
 )
+from texgs.scene import frame as of_scene
+from texgs.scene.scene import Scene, SceneModel
 from texgs.volume.view_set import View
 
 
@@ -124,7 +127,7 @@ def test_words_do_not_overlap(tmp_path, monkeypatch, view, write, models, paddin
 
 def test_phases_stand_beside_the_view(view):
     panels, visible = compare(MODELS, view, 1)
-    titles = ["ground truth", "surfels", "shading", "texture", "error × 4 (bwr)"]
+    titles = ["ground truth", "surfels", "shading", "texture", "error (red: too bright)"]
     assert [panel.title for panel in panels] == titles
     truth = ball_planes(view.camera)
     torch.testing.assert_close(panels[0].pixels, truth[:3].permute(1, 2, 0), atol=1 / 255, rtol=0)
@@ -166,6 +169,16 @@ def test_maps_of_one_material_are_numbers(view):
     middle = panels[0].pixels[10:22, 10:22].mean(dim=(0, 1))
     to_camera = view.camera.position / view.camera.position.norm()
     assert ((2 * middle - 1) @ to_camera) > 0.3, "normals face the camera"
+
+
+def test_alpha_has_the_colours_of_the_viewer(view, tmp_path):
+    """White where opaque; levels of 8 bits apart at most."""
+    model = texture()
+    write_model(tmp_path / "ball.safetensors", model)
+    scene = Scene({"ball": SceneModel(tmp_path / "ball.safetensors")})
+    in_viewer = of_scene.frame(scene.open(), view.camera, scene, mode="alpha")
+    in_report = next(panel for panel in maps(model, view, 1) if panel.title == "alpha")
+    torch.testing.assert_close(255 * in_report.pixels, torch.from_numpy(in_viewer).float(), atol=2, rtol=0)
 
 
 def test_maps_of_a_material_per_surfel_are_means(view):

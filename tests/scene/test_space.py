@@ -16,16 +16,20 @@ from tests.scene.balls import shell
 from tests.scene.cloud_files import READERS, glb
 from tests.volume.test_space import ORIENTED, TO_RAS, WRITERS, center_by_itk
 from texgs.cli.main import main
+from texgs.core.camera import orbit
 from texgs.core.geometry import quats_to_matrices
+from texgs.core.lens import Frame
 from texgs.fields.gaussians import write_gaussians
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.raster.reference.shading import harmonics
 from texgs.scene.changes import apply_all
 from texgs.scene.clouds import Cloud, place_cloud
+from texgs.scene.film import Film
 from texgs.scene.scene import Scene, SceneModel, SceneVolume
-from texgs.scene.scene_file import read_scene, write_scene
+from texgs.scene.scene_file import read_scene, title_of, write_scene
 from texgs.scene.session import Session
+from texgs.scene.shot import Shot
 from texgs.viewer.description import describe, drawn
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.prepare import prepare
@@ -314,3 +318,45 @@ def test_a_page_knows_the_letters_of_the_axes(tmp_path):
     scene = replace(scene, space=replace(scene.space, name="scanner-xyz"))
     assert describe("scan", scene, scene.open())["space"]["ends"] == [["x", ""], ["z", ""], ["", "y"]]
     assert describe("scan", replace(scene, space=None), scene.open())["space"] is None
+
+
+def test_a_patient_is_seen_first_from_the_front_by_all(tmp_path):
+    """RAS and LPS, turned about the world's upright axis: the camera sees the front, and a side obliquely."""
+    for quarter in range(4):
+        turn = np.linalg.matrix_power(np.array([[0, 0, 1], [0, 1, 0], [-1, 0, 0]]), quarter)  # about +y
+        for name, to_world in (
+            ("left-posterior-superior", [[1, 0, 0], [0, 0, -1], [0, 1, 0]]),
+            ("right-anterior-superior", [[-1, 0, 0], [0, 0, 1], [0, 1, 0]]),
+        ):
+            matrix = np.eye(4)
+            matrix[:3, :3] = 100 * np.array(to_world) @ turn
+            space = Space(name, "mm", matrix.tolist())
+            front = space.in_world(np.array([[0, 100.0 if name[0] == "r" else -100.0, 0]]))[0]
+            towards = orbit(space.front, 0, 1.0, 30, 8, 8).position.double().numpy()
+            assert towards @ front == pytest.approx(np.cos(np.radians(30)), abs=1e-5)
+    assert Space().front is None
+    scene = replace(head_up(tmp_path), frame=Frame([0.0] * 3, 0.1, azimuth=head_up(tmp_path).space.front))
+    write_scene(tmp_path / "scene.yaml", scene)
+    (home,) = describe("name", read_scene(tmp_path / "scene.yaml"), scene.open())["views"]
+    camera = orbit(home["azimuth"], home["polar"], *scene.framed().lens())
+    assert torch.equal(Shot().camera(scene.framed()).viewmat, camera.viewmat)
+    ((shown, _),) = Film().shots(scene)
+    assert torch.equal(shown.viewmat, camera.viewmat)
+    assert home["azimuth"] == pytest.approx(-60), "+z of the world is the front"
+
+
+@pytest.mark.parametrize(
+    ("path", "title"),
+    [
+        ("lung/scene/quick/compose/scene.yaml", "lung quick"),
+        ("lung/scene/quick/edits/gold/scene.yaml", "lung quick gold"),
+        ("lung/TF01/quick/texture/model.safetensors", "lung TF01 quick"),
+    ],
+)
+def test_the_title_of_a_scene_is_its_name_and_not_its_path(tmp_path, path, title):
+    file = tmp_path / path
+    file.parent.mkdir(parents=True)
+    (file.parent / "metrics.json").write_text("{}")
+    assert title_of(file) == title
+    assert title_of(tmp_path / "heart" / "scene.yaml") == "heart"
+    assert title_of(tmp_path / "heart" / "edited.yaml") == "edited"

@@ -1,11 +1,13 @@
 """Cameras that a page keeps: they are gone to, removed, in the link, and on the way of a film."""
 
 import re
+import shutil
 
 import numpy as np
 from PIL import Image, ImageSequence
 
 from tests.viewer.in_browser import WAIT, expect, opened, pixels, served, standalone, still
+from texgs.cli.main import main
 
 FIRST, SECOND = "azimuth 40°, polar 10°", "azimuth 60°, polar 10°"
 
@@ -24,17 +26,22 @@ def keep_two(page):
     return kept
 
 
-def film(page):
-    """Frames of a film through the bookmarks."""
+def exported(page, kind, way):
+    """The path of a film, or of its keys."""
     page.get_by_role("button", name="Export").click()
     dialog = page.get_by_role("dialog")
-    dialog.get_by_label("As").select_option("Film, GIF")
-    dialog.get_by_label("Camera").select_option("Through the bookmarks")
+    dialog.get_by_label("As").select_option(kind)
+    dialog.get_by_label("Camera").select_option(way)
     dialog.get_by_label("Length, seconds").fill("0.3")
     dialog.get_by_label("Frames a second").fill("10")
     with page.expect_download(timeout=WAIT) as download:
         dialog.get_by_role("button", name="Export").click()
-    with Image.open(download.value.path()) as frames:
+    return download.value.path()
+
+
+def film(page, way="Through the bookmarks"):
+    """Frames of a film."""
+    with Image.open(exported(page, "Film, GIF", way)) as frames:
         return [np.asarray(each.convert("RGB")).astype(int) for each in ImageSequence.Iterator(frames)]
 
 
@@ -42,7 +49,7 @@ def test_a_film_goes_through_the_bookmarks_of_the_viewer(chromium, scene_file):
     with served(scene_file) as (_, address), opened(chromium, address) as page:
         page.get_by_role("button", name="Export").click()
         way = page.get_by_role("dialog").get_by_label("Camera")
-        expect(way.get_by_role("option", name="Through the bookmarks")).to_be_disabled()
+        expect(way.get_by_role("option", name="Through the bookmarks", exact=True)).to_be_disabled()
         page.keyboard.press("Escape")
         keep_two(page)
         ends = [pixels(still(page))]
@@ -53,6 +60,41 @@ def test_a_film_goes_through_the_bookmarks_of_the_viewer(chromium, scene_file):
         for k in range(2):
             first, middle, last = (np.abs(frame - ends[k]).mean() for frame in frames)
             assert 2 * (first, last)[k] < min(middle, (last, first)[k])
+
+
+def test_edits_of_bookmarks_come_back_and_move_in_films_that_the_command_line_makes_again(
+    chromium, scene_file, tmp_path
+):
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        keep = page.get_by_role("button", name="Keep this view")
+        keep.click()
+        again = page.get_by_role("button", name="Go to bookmark 1 and make its edits again")
+        expect(again).to_be_hidden()
+        page.get_by_role("spinbutton", name="Opacity of TF01, as a number").fill("0.1")
+        expect(again).to_be_visible()
+        keep.click()
+        edited = pixels(still(page))
+        again.click()
+        expect(page.get_by_role("spinbutton", name="Opacity of TF01, as a number")).to_have_value("1")
+        fitted = pixels(still(page))
+        assert np.abs(edited - fitted).mean() > 1
+        shown = film(page, "Bookmarks with their edits")
+        assert [np.abs(shown[at] - end).mean() < 3 for at, end in ((0, fitted), (2, edited))] == [True, True]
+        plain = film(page)
+        assert np.abs(plain[-1] - fitted).mean() < 3, "of the scene as it is"
+        made = exported(page, "Keys of a film, YAML", "Bookmarks with their edits")
+        keys = shutil.copy(made, tmp_path / "scene-keys.yaml")  # the browser removes its own
+        told = page.get_by_text("This film again: texgs render scene.yaml --film scene-keys.yaml")
+        words = re.search("--width .* --fps 10", told.inner_text())[0].split()
+        page.reload()
+        expect(again, "the link has the edits of both").to_be_hidden()
+        expect(page.get_by_role("button", name="Go to bookmark 2 and make its edits again")).to_be_visible()
+    folder = tmp_path / "film"
+    assert main(["render", str(scene_file), "--film", str(keys), *words, "--output", str(folder)]) == 0
+    for at, frame in enumerate(sorted(folder.iterdir())):
+        assert np.abs(np.asarray(Image.open(frame)).astype(int) - shown[at]).mean() < 3, (
+            "of the colours of a GIF"
+        )
 
 
 def test_bookmarks_stay_in_the_link_of_the_standalone_page(chromium, scene_file):

@@ -252,6 +252,7 @@ def test_a_click_makes_a_segment(chromium, balls_file):
         page.get_by_role("button", name="Make segment").click()
         page.get_by_role("checkbox", name="blue").uncheck(timeout=WAIT)
         expect(page.get_by_role("listitem")).to_have_text(["balls/blue new", "balls/blue visible off"])
+        expect(page).to_have_url(re.compile("balls%2Fblue"), timeout=WAIT)  # in the link
         page.get_by_role("button", name="Rename balls/blue").click()
         page.get_by_role("dialog").get_by_label("Name").fill("sea")
         page.keyboard.press("Enter")

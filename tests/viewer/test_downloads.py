@@ -3,21 +3,21 @@
 import io
 
 import numpy as np
-import torch
 from PIL import Image, ImageSequence
 from plyfile import PlyData
 
 from tests.viewer.pages import TOKEN, on_page
 from tests.viewer.test_messages import CAMERA
-from texgs.viewer.downloads import exports_of, way_of
-from texgs.viewer.messages import Export, Orbit, View
+from texgs.scene.film import Film
+from texgs.scene.shot import Shot
+from texgs.viewer.downloads import exports_of
 
 VIEW = {"camera": CAMERA, "mode": "shaded"}
 
 
-async def saved(browser, client, kind, **length):
+async def saved(browser, client, kind, **film):
     """Name and bytes of an export."""
-    await browser.send(type="export", kind=kind, view=VIEW, **length)
+    await browser.send(type="export", kind=kind, view=VIEW, **film)
     news = await browser.next("notice")
     assert news["level"] == "file", news
     async with client.get(f"/{TOKEN}/files/{news['name']}") as answer:
@@ -26,28 +26,34 @@ async def saved(browser, client, kind, **length):
 
 
 @on_page
-async def test_a_turntable_begins_with_the_view(browser, client):
-    name, film = await saved(browser, client, "gif", seconds=0.5, fps=8)
+async def test_a_film_through_keys_is_that_of_the_command_line(browser, client):
+    """At the keys it is the picture of the page, with the edits of the key."""
+    place = {"target": [0, 0, 0], "azimuth": 30, "polar": 20, "radius": 3, "fov_y": 40, "seconds": 0.25}
+    keys = [place, {**place, "azimuth": 75, "TF01.palette": [0, 0, 1], "light": {"azimuth": 20, "polar": 5}}]
+    name, film = await saved(browser, client, "gif", keys=[*keys, {"azimuth": 80}], fps=8)
     assert name == "scene.gif"
     pictures = ImageSequence.Iterator(Image.open(io.BytesIO(film)))
     frames = [np.asarray(each.convert("RGB")).astype(int) for each in pictures]
+    assert len(frames) == 5
+    shots = Film(keys=keys, fps=8, width=64, height=48).shots(client.server_side.edits.scene)
+    for at, (camera, scene) in enumerate(shots):
+        expected = client.server_side.edits.session.picture(camera, Shot(), scene).astype(int)
+        assert np.abs(frames[at] - expected).mean() < 5, "of the colours of a GIF"
     await browser.send(type="view", id=1, **VIEW)
     _, shown = await browser.next("frame")
-    assert len(frames) == 4
-    assert np.abs(frames[0] - shown).mean() < 5  # of the colours of a GIF
+    assert np.abs(frames[0] - shown).mean() < 5
     assert np.abs(frames[2] - shown).mean() > 5
 
 
-def test_a_film_passes_its_stops_evenly_and_the_short_way():
-    places = [(170.0, 0.0, 3.0), (-170.0, 90.0, 6.0), (-100.0, -20.0, 3.0)]
-    camera = {"target": (0.0, 0.0, 0.0), "fov_y": 40.0, "width": 8, "height": 4}
-    stops = tuple(Orbit(azimuth=a, polar=p, distance=d, **camera) for a, p, d in places)
-    way = way_of(Export("mp4", View(stops[0]), stops, seconds=0.5, fps=10))
-    for index, stop in zip((0, 2, 4), stops, strict=True):
-        torch.testing.assert_close(way[index].camera().viewmat, stop.camera().viewmat, atol=1e-5, rtol=0)
-    assert 170 < way[1].azimuth < 190
-    assert 0 < way[1].polar < 90
-    assert {(each.width, each.height) for each in way} == {(8, 4)}
+@on_page
+async def test_a_film_without_keys_is_told(browser, client):
+    await browser.send(type="export", kind="mp4", view=VIEW, keys=[{"azimuth": 3}, {"TF03.opacity": 1}])
+    assert "keys: key 2: TF03.opacity=1: expected a model" in (await browser.next("notice"))["text"]
+    for name in ("TF01.file", "TF01.texture", "TF01/new", "cut"):
+        await browser.send(type="export", kind="mp4", view=VIEW, keys=[{}, {name: "/etc/hostname"}])
+        assert "keys: no such key" in (await browser.next("notice"))["text"]
+    await browser.send(type="export", kind="mp4", view=VIEW)
+    assert "keys: expected a list of two keys or more" in (await browser.next("notice"))["text"]
 
 
 @on_page

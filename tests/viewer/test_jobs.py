@@ -6,8 +6,8 @@ import threading
 import pytest
 import torch
 
+from texgs.core.errors import Stopped
 from texgs.core.progress import progress
-from texgs.viewer.page import Stopped
 from texgs.viewer.work import Jobs
 
 

@@ -86,7 +86,7 @@ def test_a_camera_is_that_of_the_renderer_and_half_of_it_sees_the_same():
         (VIEW, {"camera": {}}, "camera.target: expected a value, got none"),
         (VIEW, {"type": "undo"}, "id: no such key"),
         (PICK, {"pixel": [3, 4096]}, "pixel: expected at most 4095, got 4096"),
-        (EXPORT, {"stops": [CAMERA] * 21}, "stops: expected 0 to 20 values, got 21"),
+        (EXPORT, {"keys": [{}] * 21}, "keys: expected 0 to 20 values, got 21"),
         (EXPORT, {"fps": 0}, "fps: expected at least 1, got 0"),
         ({"type": "look"}, {"hue": 1.01}, "hue: expected at most 1, got 1.01"),
         ({"type": "look"}, {"hue": -0.01}, "hue: expected at least 0, got -0.01"),
@@ -115,7 +115,7 @@ VALUES = st.recursive(
 
 
 KEYS = ("id", "camera", "mode", "moving", "before", "only", "part", "key", "value", "step", "name", "replace",
-        "model", "points", "outline", "function", "view", "pixel", "kind", "stops", "seconds",
+        "model", "points", "outline", "function", "view", "pixel", "kind", "keys", "fps",
         "fps", "parts", "style", "instruction", "sphere", "hue", "preview")  # fmt: skip
 
 

@@ -61,6 +61,11 @@ def test_a_description_has_all_parts_and_what_they_can_show(tmp_path):
     assert [each["name"] for each in first["segments"]] == ["half"]
     assert first["segments"][0]["edit"]["opacity"] == 0.5
     assert first["fitted_palette"] == pytest.approx(model.parameters["palette"].tolist())
+    assert not first["styled"]
+    assert not first["segments"][0]["styled"]
+    entry = replace(session.scene.models["TF0"], texture=tmp_path / "look.safetensors")
+    looked = replace(session.scene, models={**session.scene.models, "TF0": entry})
+    assert describe("name", looked, session.composition)["models"][0]["styled"], "its palette says so"
     numbers = ["opacity", "ambient", "diffuse", "specular", "shininess"]
     assert first["can"] == ["visible", "palette", *numbers, "tint", "look", "segments"]
     assert "palette" not in second["can"], "there is none without a texture"

@@ -141,5 +141,5 @@ def test_the_viewer_exports_it_too(source, tmp_path):
     assert "volume" in exports_of(scene)
     assert "volume" not in exports_of(replace(scene, volume=None))
     for kind in ("volume", "html"):
-        written, _ = write_download(tmp_path, scene, Export(kind, VIEW), "page", "", None)
+        written, _ = write_download(tmp_path, scene, Export(kind, VIEW), "page", "Page", "", None)
         assert ('id="volume"' in written.read_text()) is (kind == "volume")

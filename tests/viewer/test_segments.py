@@ -171,12 +171,12 @@ class Waiting(GrabCut):
     def __init__(self):
         self.reached, self.go_on, self.calls = threading.Event(), threading.Event(), 0
 
-    def __call__(self, image, points, positive, held=None):
+    def __call__(self, image, points, positive, held=None, shown=None):
         self.calls += 1
         if self.calls == 2:
             self.reached.set()
             self.go_on.wait(30)
-        return super().__call__(image, points, positive, held)
+        return super().__call__(image, points, positive, held, shown)
 
 
 @on_page

@@ -55,7 +55,7 @@ def test_a_film_has_a_size_and_a_length(chromium, scene_file):
         page.get_by_role("dialog").get_by_label("As").select_option("points")
         expect(page.get_by_label("Length, seconds")).to_be_hidden()
         page.get_by_role("dialog").get_by_label("As").select_option("gif")
-        expect(page.get_by_label("Length, seconds")).to_have_value("2.88")
+        expect(page.get_by_label("Length, seconds")).to_have_value("4")
         fill_size(page, ("60", "40"))
         page.get_by_label("Length, seconds").fill("0.5")
         page.get_by_label("Frames a second").fill("8")

@@ -29,7 +29,7 @@ def test_what_is_dragged_is_the_volume_that_texgs_renders(chromium, sphere_file)
         before = still(page)
         drag(page, page.get_by_role("slider", name="Point 2 of low"), (0.5, 0.5), (6, -3))
         expect(page.get_by_label("Show", exact=True)).to_have_value("volume")
-        expect(page.get_by_role("listitem")).to_have_text(["functions low"])
+        expect(page.get_by_role("listitem")).to_have_text([re.compile(r"^functions low opacity at [\d.]+$")])
         save_as(page, "tried.yaml")
         tried = read_scene(sphere_file.parent / "tried.yaml")
         basic, edited = tried.volume.tfs["low"], tried.functions["low"]
@@ -77,7 +77,7 @@ def test_functions_stand_in_the_link(chromium, sphere_file):
         page.goto("about:blank")
         page.goto(link)
         page.get_by_role("button", name="Make it on all pages").click()
-        expect(page.get_by_role("listitem")).to_have_text(["functions low"])
+        expect(page.get_by_role("listitem")).to_have_text([re.compile(r"^functions low opacity at [\d.]+$")])
 
 
 def test_keys_and_numbers_move_points(chromium, sphere_file):
@@ -148,7 +148,7 @@ def test_a_model_of_a_function_is_begun_and_cancelled(chromium, sphere_file):
         expect(page.locator("#job-title")).to_have_text(re.compile("TF03, (views|pass 1)"), timeout=WAIT)
         page.get_by_role("button", name="Cancel").first.click()
         expect(page.get_by_text("it was cancelled; nothing has changed")).to_be_visible(timeout=WAIT)
-        expect(page.get_by_role("listitem")).to_have_text(["functions TF03"])
+        expect(page.get_by_role("listitem")).to_have_text(["functions TF03 new"])
         assert not list(sphere_file.parent.glob("*TF03*"))
 
 

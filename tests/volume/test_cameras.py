@@ -1,6 +1,6 @@
 import json
-from itertools import pairwise
-from math import atan, degrees, tan
+from itertools import combinations, pairwise
+from math import acos, asin, atan, degrees, tan
 
 import numpy as np
 import pytest
@@ -96,6 +96,17 @@ def test_cameras_are_spread_evenly_over_a_path():
     assert len(places) == 61
     assert {after - before for before, after in pairwise(places)} <= {2, 3}
     assert cameras.spread(path, 1) == path[:1]
+
+
+def test_sights_are_far_apart_and_of_different_heights():
+    """What is round about +y looks the same from one height."""
+    seen = cameras.sights(LENS)
+    directions = [view / np.linalg.norm(view) for view in positions(list(seen.values()))]
+    for one, other in combinations(directions, 2):
+        assert degrees(acos(one @ other)) > 90
+        assert abs(degrees(asin(one[1])) - degrees(asin(other[1]))) >= 29.9
+    assert list(seen) == ["front", "below", "above"]
+    assert directions[0][2] > 0.9, "+z is in front"
 
 
 def test_the_first_cameras_are_each_the_farthest_from_those_before():

@@ -3,6 +3,8 @@
 import subprocess
 from types import SimpleNamespace
 
+import pytest
+
 from texgs.workflow.rule_jobs import RuleJobs, report_params, shell_prefix
 from texgs.workflow.stage_table import RULES
 
@@ -38,11 +40,14 @@ def test_ballots_of_a_study_go_into_the_tables(tmp_path):
     assert params["study"] == ["--study", f"{tmp_path}/study/key.json"]
 
 
-def test_commands_have_the_environment_of_jobs_and_go_on_without_a_reader(tmp_path):
+@pytest.mark.parametrize("is_shown", [True, False])
+def test_commands_have_the_environment_of_jobs_and_go_on_without_a_reader(tmp_path, is_shown):
     client = tmp_path / "it's a client.py"
     client.write_text("import os, sys\nprint(os.environ['TOLD'], *sys.argv[1:])")
-    prefix = shell_prefix({"TOLD": "a 'b'"}, str(client)).format()  # as Snakemake does
-    command = f"{prefix} texgs c 'd e' | tee log | head -c 0"
-    done = subprocess.run(["bash", "-c", command], cwd=tmp_path, check=False)
-    assert done.returncode == 0
-    assert (tmp_path / "log").read_text() == "a 'b' c d e\n"
+    prefix = shell_prefix({"TOLD": "a 'b'"}, str(client), is_shown=is_shown).format()  # as Snakemake does
+    command = f"{prefix} texgs c 'd e' | tee log"
+    for end in ("", " | head -c 0"):
+        done = subprocess.run(["bash", "-c", command + end], cwd=tmp_path, check=False, capture_output=True)
+        assert done.returncode == 0
+        assert (tmp_path / "log").read_text() == "a 'b' c d e\n"
+        assert bool(done.stdout) == (is_shown and not end)

@@ -54,7 +54,7 @@ class Editing:
     )
     reach = Value[float]("How far matter is that hides ambient light: set world units up to 2.", of="light")
     background = Value["tuple[float, float, float]"](
-        'Colour behind the scene: set red, green, blue from 0 to 1, or "#rrggbb".'
+        'Colour behind the scene: set red, green, blue from 0 to 1, "#rrggbb" or a name.'
     )
     markers = Value[tuple[Marker, ...]]("Points and distances in world units, see `mark`; None: none.")
     time = Value["int | None"]("Number of the step that is shown, of a scene of a series; None of others.")
@@ -152,7 +152,7 @@ class Editing:
         point: Sequence[float] | Sequence[Sequence[float]],
         *,
         model: str | None = None,
-        azimuth: float = 30.0,
+        azimuth: float | None = None,
         polar: float = 20.0,
         size: int = 800,
         masks: str = "mobile_sam",
@@ -164,7 +164,7 @@ class Editing:
             name: of the segment.
             point: pixel x, y, or several, in a square picture of the model alone from there.
             model: name; may be left out where there is one.
-            azimuth: of that picture's camera, degrees.
+            azimuth: of that picture's camera, degrees; default as for `render`.
             polar: of that picture's camera, degrees.
             size: of that picture, pixels.
             masks: what finds the object in pictures; "grabcut" needs no weights.
@@ -183,6 +183,7 @@ class Editing:
             pixels = torch.tensor(point, dtype=torch.float32, device=device).reshape(-1, 2) + 0.5
         except (TypeError, ValueError, RuntimeError) as error:
             raise ArgumentError(f"point: expected pixel x, y, or several, got {point!r:.100}") from error
+        azimuth = framed.azimuth if azimuth is None else azimuth
         camera = Shot(size, azimuth=azimuth, polar=polar).camera(framed).to(device)
         clicks = Clicks(camera, pixels, torch.ones(len(pixels), dtype=torch.bool, device=device))
         keys, facts = MaskKeys(masks, views=views), {"view": [azimuth, polar], "point": pixels.tolist()}

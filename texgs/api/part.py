@@ -55,7 +55,7 @@ class Part:
     __slots__ = ("_part", "session")  # a slip in the name of a value is an AttributeError
 
     visible = Value[bool]()
-    palette = Value["tuple[float, float, float] | None"]()  # set red, green, blue from 0 to 1, or "#rrggbb"
+    palette = Value["tuple[float, float, float] | None"]()  # set r, g, b from 0 to 1, "#rrggbb" or "red"
     opacity = Value[float]()  # factors of what was fitted, from 0 on
     ambient = Value[float]()
     diffuse = Value[float]()

@@ -20,9 +20,9 @@ from texgs.api.functions import AnyFunctions, Functions, named
 from texgs.api.keywords import takes
 from texgs.api.labels import sources_of
 from texgs.config.project import is_name, name_of
+from texgs.core.colors import color
 from texgs.core.errors import ArgumentError
 from texgs.core.names import close, mask_name
-from texgs.fields.part_edit import color
 from texgs.scene.frame import quantize
 from texgs.scene.scene import WHITE
 from texgs.scene.scene_file import light_of
@@ -184,7 +184,7 @@ class Volume:
             height: pixels; default the width.
             light: "headlight", azimuth and polar angle in degrees, or keys of a scene file's light such as
                 `{"polar": 40, "shadows": 0.7}`.
-            background: red, green, blue from 0 to 1, or "#rrggbb".
+            background: red, green, blue from 0 to 1, "#rrggbb" or a name such as "black".
             step: distance of samples along rays, voxels.
         """
         tfs = named(self.suggest() if functions is None else functions)

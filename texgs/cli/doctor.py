@@ -19,7 +19,10 @@ from texgs.core.cache import cache_folder, weights_folder
 from texgs.core.errors import TexgsError, first_line
 
 AGAIN = "install texgs again"
-CUDA_ADVICE = "only needed for a GPU: put nvcc (CUDA 12 or newer) on the PATH and install texgs again"
+CUDA_ADVICE = (
+    "only needed for a GPU: put nvcc (CUDA 12 or newer) on the PATH, then `make install CUDA=1`, "
+    "or `pip install . -C cmake.define.TEXGS_CUDA=ON`"
+)
 
 
 @dataclass(frozen=True)
@@ -84,9 +87,9 @@ def show(findings: Iterable[tuple[str, Finding]]) -> int:
 def python() -> Finding:
     """Find out whether this Python is one texgs is tested with."""
     python = f"{platform.python_version()} on {platform.machine()} {platform.system()}"
-    if (3, 11) <= sys.version_info[:2] <= (3, 13):
+    if (3, 11) <= sys.version_info[:2] <= (3, 14):
         return Finding("ok", python)
-    return Finding("missing", python, "install Python 3.11 to 3.13")
+    return Finding("missing", python, "install Python 3.11 to 3.14")
 
 
 def packages() -> Finding:

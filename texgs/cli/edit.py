@@ -8,6 +8,7 @@ from pathlib import Path
 from texgs.cli.options import require_own_place
 from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.names import SCENES
+from texgs.fields.part_edit import require_part_key
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,11 +18,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "overrides",
         nargs="*",
         metavar="KEY=VALUE",
-        help="MODEL.KEY=VALUE with visible, palette (r,g,b from 0 to 1, or #rrggbb), opacity, ambient, "
-        "diffuse, specular, shininess (factors), tint (a colour, of highlights), texture (a file) or file "
-        "(another model); light=headlight or light=AZIMUTH,POLAR; shadows=SHARE (0 to 1) of the "
-        "light, and occlusion=SHARE of ambient light, that matter takes away; reach=DISTANCE (world units) "
-        "within which matter hides ambient light; background=#rrggbb; time=STEP of a series; "
+        help="MODEL.KEY=VALUE with visible, palette (r,g,b from 0 to 1, #rrggbb or a name such as red), "
+        "opacity, ambient, diffuse, specular, shininess (factors), tint (a colour, of highlights), "
+        "texture (a file) or file (another model); light=headlight or light=AZIMUTH,POLAR; "
+        "shadows=SHARE (0 to 1) of the light, and occlusion=SHARE of ambient light, that matter takes away; "
+        "reach=DISTANCE (world units) within which matter hides ambient light; background=COLOUR; time=STEP; "
         "cut=AXIS,POSITION (x, -x, y, ...; world units, or samples as in 64v; or R, A, S, L, P, "
         "I, X, Y, Z, of the volume's file, in its unit, as in S,-12mm) or "
         "cut=NX,NY,NZ,OFFSET adds a plane, cut.1=... replaces it, cut= takes all back; "
@@ -36,10 +37,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the edited scene."""
+    for word in arguments.overrides:  # before torch, which takes a second to load
+        with errors_at(word):
+            require_part_key(word)
+    require_scene(arguments.output)
     from texgs.scene.changes import apply_all
     from texgs.scene.session import Session
 
-    require_scene(arguments.output)
     session = Session.open(arguments.scene)
     apply_all(session, arguments.overrides)
     with errors_at(arguments.scene):

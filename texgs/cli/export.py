@@ -14,7 +14,7 @@ from texgs.viewer import PAGE_VOLUME
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what to export, and where to."""
-    parser.add_argument("source", type=Path, help="scene.yaml, a folder with one, or a model file")
+    parser.add_argument("scene", type=Path, help="scene.yaml, a folder with one, or a model file")
     parser.add_argument("--to", "--output", type=Path, required=True, metavar="FILE", help=" ".join(ENDINGS))
     add_keys(parser, Export, without=("volume",))
     words = (
@@ -26,18 +26,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the file."""
+    keys = keys_of(arguments, Export)
+    require_own_place(arguments.to, "--to")
     from texgs.report.check import found_sentence
-    from texgs.scene.scene_file import read_scene, scene_path
+    from texgs.scene.scene_file import read_scene, scene_path, title_of
     from texgs.viewer.export import export
 
-    keys, source = keys_of(arguments, Export), scene_path(arguments.source)
+    source = scene_path(arguments.scene)
     scene = read_scene(source)
     if source.suffix not in SCENES:
         if keys.model is not None:
             raise ArgumentError(f"--model: expected a scene to choose it from, got {source}; leave it out")
         keys = replace(keys, model=next(iter(scene.models)))
-    require_own_place(arguments.to, "--to")
-    notes = export(arguments.to, scene, keys, found_sentence(source, scene))
+    notes = export(arguments.to, scene, keys, found_sentence(source, scene), title_of(source))
     print(arguments.to)
     for note in notes:
         print(f"{arguments.to}: {note}", file=sys.stderr)

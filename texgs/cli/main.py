@@ -13,7 +13,9 @@ from texgs import __version__
 from texgs.cli.options import Parser
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.memory import as_out_of_memory, collect_rarely, keep_freed_memory, waiting
-from texgs.core.names import close
+from texgs.core.names import close, require_scene
+from texgs.edit.method import methods
+from texgs.fields.kinds import kinds
 
 try:
     from texgs.workflow.stage_table import STAGES
@@ -25,35 +27,29 @@ NUMBER = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")  # such as -1e-3, of 
 NUMBERS = re.compile(rf"(?!{NUMBER.pattern})-[\d.][-\d.,eE]*")  # such as -90,20
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`.
 # Verbs in the module of another have `add_VERB_arguments` and `run_VERB` there; those of stages share one.
-SHARED = {
-    "init": "new",
-    "series": "model",
-    "report": "tables",
-    "votes": "study",
-    "download": "weights",
-}
+SHARED = {"init": "new", "series": "model", "report": "tables", "votes": "study", "download": "weights"}
 STAGE_VERBS = {stage.name: stage.help for stage in STAGES.values()}
 FIRST_VERBS = {
     "init": "start a folder with configurations of your own",
     "new": "start a data set from a volume file of your own, with suggested transfer functions",
     "run": "run the workflow: from the volume to the report, whatever is not done yet",
+    "view": "look at a scene and edit it in the browser",
+    "edit": "change colours, opacities and lights of a scene",
+    "render": "render a scene to PNG, GIF or MP4",
+    "export": "export a scene or a model as Gaussians, points, a mesh or a compact file",
+    "check": "check how far a scene is from its volume",
+    "segment": "segment a model of a scene by clicks, to edit a part of it",
+    "model": "fit a model of a transfer function that a scene tries, in about a minute",
+    "series": "follow the models of a scene through the volumes of a series in time",
+    "doctor": "show what is installed, what is missing and what to do about it",
 }
 LATER_VERBS = {
-    "edit": "change colours, opacities and lights of a scene",
-    "series": "follow the models of a scene through the volumes of a series in time",
-    "model": "fit a model of a transfer function that a scene tries, in about a minute",
-    "segment": "segment a model of a scene by clicks, to edit a part of it",
-    "view": "look at a scene and edit it in the browser",
-    "render": "render a scene to PNG, GIF or MP4",
-    "check": "check how far a scene is from its volume",
-    "export": "export a scene or a model as Gaussians, points, a mesh or a compact file",
     "tables": "write the tables that metrics files hold",
     "report": "write one HTML file with the pictures, tables and provenance of all jobs",
     "study": "make a user study of edited scenes: a page for voters, and its key",
     "votes": "count the ballots of a user study",
     "download": "download a file and compare it with its checksum",
     "weights": "list pretrained weights, and download those that are named",
-    "doctor": "show what is installed, what is missing and what to do about it",
 }
 VERBS = {**FIRST_VERBS, **STAGE_VERBS, **LATER_VERBS}
 if taken := STAGE_VERBS.keys() & {*FIRST_VERBS, *LATER_VERBS}:
@@ -64,17 +60,23 @@ if taken := STAGE_VERBS.keys() & {*FIRST_VERBS, *LATER_VERBS}:
 
 def overview() -> argparse.ArgumentParser:
     """Return the parser that lists the verbs."""
-    top = Parser(
-        prog="texgs", description="Editable 3D scenes of textured 2D Gaussians from scientific volumes."
-    )
+    about = "Editable 3D scenes of textured 2D Gaussians from scientific volumes."
+    top = Parser(prog="texgs", usage="texgs [-h] [--version] VERB ...", description=about)
     top.add_argument("--version", action="version", version=f"texgs {__version__}")
-    verbs = top.add_subparsers(metavar="VERB", required=True)
-    for name, summary in VERBS.items():
-        verbs.add_parser(name, help=summary, add_help=False)
+    others = {*kinds(), *(f"edit_{name}" for name, each in methods().items() if each.fields)} - {"surfels"}
+    for title, names in {
+        "every day": FIRST_VERBS,
+        "beside": LATER_VERBS,
+        "steps of texgs run, one at a time": [name for name in STAGE_VERBS if name not in others],
+        "the same of other fields, to compare with": [name for name in STAGE_VERBS if name in others],
+    }.items():
+        group = top.add_argument_group(title)
+        for name in names:
+            group.add_argument(name, nargs="?", help=VERBS[name])
     return top
 
 
-def parser(verb: str) -> argparse.ArgumentParser:
+def parser(verb: str) -> Parser:
     """Return the parser of a verb. Its module is imported here and must stay light: no torch at the top."""
     home = "stage" if verb in STAGE_VERBS else SHARED.get(verb, verb)
     module = importlib.import_module(f"texgs.cli.{home}")
@@ -95,10 +97,13 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     if verb not in VERBS:
         if not verb.startswith("-"):
             raise ArgumentError(f"no such verb{close(verb, VERBS) or '; texgs --help lists all'}")
-        return overview().parse_args(argv)
+        overview().parse_args(argv)
+        overview().error("the following arguments are required: VERB")
     if verb == "run" and words[:1] not in (["-h"], ["--help"]):
         return parser(verb).parse_args(["--", *words])  # its options are those of snakemake
-    return parser(verb).parse_intermixed_args(join_numbers(words))
+    made = parser(verb)
+    made.require_options(words)
+    return made.parse_intermixed_args(join_numbers(words))
 
 
 def join_numbers(words: Sequence[str]) -> list[str]:
@@ -132,6 +137,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         try:
             arguments = parse(words)
+            if "scene" in arguments:
+                require_scene(arguments.scene)  # here, as its own code takes a second to load
             with as_out_of_memory():
                 return int(arguments.run(arguments))
         finally:

@@ -3,6 +3,7 @@
 import argparse
 from collections.abc import Sequence
 from dataclasses import MISSING, Field, is_dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar, cast, get_args, get_origin
 
@@ -22,6 +23,13 @@ class Parser(argparse.ArgumentParser):
         is_option = bool(unknown) and unknown[0].startswith("-")
         hint = close(unknown[0], self._option_string_actions) if is_option else ""
         self.exit(2, f"{self.prog}: {where}{message}{hint or f'; see {self.prog} --help'}\n")
+
+    def require_options(self, words: Sequence[str]) -> None:
+        """Refuse the first unknown option: argparse would rather tell that another one is required."""
+        for word in takewhile("--".__ne__, words):
+            name = word.partition("=")[0]
+            if name.startswith("--") and not any(x.startswith(name) for x in self._option_string_actions):
+                self.error(f"unrecognized arguments: {word}")
 
 
 def option(parser: argparse.ArgumentParser, name: str, default: Any, words: str, **more: Any) -> None:

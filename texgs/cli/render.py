@@ -29,6 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Render and write."""
+    film = keys_of(arguments, Film)
+    require_compatible(arguments, film)
     from texgs.core.check import torch_device
     from texgs.core.image import with_caption
     from texgs.report.check import found_sentence
@@ -37,10 +39,8 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.scene.session import Session
     from texgs.scene.twin import needs_twin
 
-    film = keys_of(arguments, Film)
     arguments.scene = scene_path(arguments.scene)
     scene = read_scene(arguments.scene)
-    require_compatible(arguments, film)
     ending = ".png" if film.count == 1 else ".mp4"
     output = arguments.output or Path(f"{arguments.scene.stem}{ending}")
     require_own_place(output)
@@ -71,6 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def require_compatible(arguments: argparse.Namespace, film: Film) -> None:
     """Refuse options that do not go together."""
+    if film.keys and film.what != "view":
+        raise ArgumentError(f"--film: expected no --path, got {film.what}; leave one of them out")
     if film.transparent and (arguments.compare or arguments.caption):
         raise ArgumentError("--transparent: expected neither --compare nor --caption; leave them out")
     if arguments.compare and film.mode != "shaded":

@@ -12,7 +12,7 @@ import signal
 import sys
 from collections.abc import Sequence
 from dataclasses import fields
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from pathlib import Path
 from types import FrameType
 
@@ -56,7 +56,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 def snakemake(words: Sequence[str]) -> bool:
     """Run the workflow of texgs in this process; return whether it ended well."""
+    require_composed(words)
     from texgs.cli.snakemake import execute, option_errors, overrides, parser_of
+    from texgs.config.project import no_project
 
     with option_errors():
         parser = parser_of()
@@ -71,13 +73,26 @@ def snakemake(words: Sequence[str]) -> bool:
         rest = [word for word in words if word != "--"]
         for word in given.targets:
             rest.remove(word)
+        if outside := no_project():
+            print(f"texgs: {outside}; results are written here", file=sys.stderr)
         if profiles := profiles_of(given):
             print(f"Using profile {' and '.join(profiles)} for options that are not given", file=sys.stderr)
         options = parser_of(profiles).parse_args([*defaults(given), *rest])
     options.targets = targets
     options.config = [*(options.config or ()), *overrides(chosen, options.config or ())]
     sys.argv = ["snakemake", *rest]  # the Snakefile looks there
-    return execute(options)
+    options.verbose = False  # it asks for Snakemake's log, whose own `verbose` is for its developers
+    return execute(options, own_log=not (given.verbose or given.dryrun or given.quiet or given.logger))
+
+
+def require_composed(words: Sequence[str]) -> None:
+    """Compose the words, where none may be the value of an option: Snakemake takes long and writes a log."""
+    from texgs.workflow.cases import split_aimed
+    from texgs.workflow.sweep import as_sweep
+
+    chosen = [*takewhile(WORD.fullmatch, words)]
+    if chosen and not any(map(WORD.fullmatch, words[len(chosen) :])):
+        _ = split_aimed(as_sweep(tuple(chosen)))[0].config
 
 
 def target_names() -> list[str]:

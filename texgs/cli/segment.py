@@ -42,9 +42,8 @@ def add_clicks(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--view",
         type=numbers,
-        default=(30.0, 20.0),
         metavar="AZIMUTH,POLAR",
-        help="degrees, of the view clicked on (30,20): what texgs render shows of the model alone",
+        help="degrees, of the view clicked on; default as texgs render, which shows the model alone so",
     )
     pixels: dict[str, Any] = {"action": "append", "type": numbers, "default": [], "metavar": "X,Y"}
     seen, other = "pixel on the object, counted from 0,0", "pixel that is not of the object"
@@ -61,16 +60,20 @@ def numbers(text: str) -> tuple[float, float]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the scene with the segment, and the segment's file; or a preview of the mask."""
+    keys = keys_of(arguments, MaskKeys)
+    require_output(arguments)
     from texgs.core.check import torch_device
     from texgs.core.image import write_png
     from texgs.edit.new_segment import clicked_model, model_name, new_segment, preview
     from texgs.models.sam import mask_model
     from texgs.scene.session import Session
+    from texgs.scene.shot import Shot
 
-    session, keys = Session.open(arguments.scene), keys_of(arguments, MaskKeys)
+    session = Session.open(arguments.scene)
     name = model_name(session.scene, arguments.model, "--model")
-    require_output(arguments)
-    lens = keys_of(arguments, LensKeys).lens(session.scene.framed())
+    framed = session.scene.framed()
+    arguments.view = arguments.view or (framed.azimuth, Shot.polar)
+    lens = keys_of(arguments, LensKeys).lens(framed)
     device = torch_device(arguments.device)
     clicks, masks = clicks_of(arguments, lens, device), mask_model(keys.masks, device)
     if arguments.preview:

@@ -7,6 +7,8 @@ This file alone uses what Snakemake does not document: `snakemake.cli`, which re
 
 import argparse
 import atexit
+import os
+import re
 import shlex
 import sys
 import tempfile
@@ -17,7 +19,9 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+from snakemake_interface_logger_plugins.registry import LoggerPluginRegistry
 
+from texgs.cli import run_log
 from texgs.cli.options import Parser
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.workflow import tracked
@@ -49,7 +53,8 @@ def parser_of(profiles: Sequence[str] = ()) -> argparse.ArgumentParser:
 
     parser: argparse.ArgumentParser = get_argument_parser(profiles=[*profiles] or None)
     parser.prog = "snakemake"
-    where = f"{' and '.join(profiles)}: " if profiles else ""
+    of = " of SNAKEMAKE_PROFILE" if os.environ.get("SNAKEMAKE_PROFILE") in profiles else ""
+    where = f"{' and '.join(profiles)}{of}: " if profiles else ""
     parser.error = partial(Parser.error, parser, where=where)  # type: ignore[arg-type, method-assign]
     return parser
 
@@ -71,10 +76,13 @@ def overrides(words: Sequence[str], config: Sequence[str]) -> list[str]:
     return [f"overrides= {text.strip()} "]  # in spaces: snakemake strips quotes from the ends
 
 
-def execute(options: argparse.Namespace) -> bool:
-    """Run Snakemake with options, by default on all cores; return whether all went well."""
+def execute(options: argparse.Namespace, *, own_log: bool) -> bool:
+    """Run Snakemake on all cores or as options say, with our log or its own; return whether all went well."""
     from snakemake.cli import args_to_api, parse_cores
 
+    if own_log:
+        LoggerPluginRegistry().register_plugin("texgs", run_log)
+        options.logger = ["texgs"]
     if options.cores is None and options.jobs is None:
         options.cores = parse_cores("all")
     with place_errors():
@@ -116,6 +124,7 @@ class WorkflowRun:
     ) -> None:
         self._workflow, self._plan, self._words, self._start_server = workflow, plan, words, start_server
         self._tracked: dict[str, tracked.Run] = {}
+        self.has_own_log = "texgs" in workflow.output_settings.log_handler_settings
         self._held: list[object] = []  # released at the end of this process, however it ends
 
     def begin(self) -> None:
@@ -136,6 +145,7 @@ class WorkflowRun:
 
     def succeed(self) -> None:
         """End the tracked runs; print where the report is, and how to look at the scenes and the runs."""
+        self._end_log()
         plan, made = self._plan, self._made()
         note_written(plan.results, made)
         tracked.end_runs(self._tracked, "FINISHED", plan, made)
@@ -154,7 +164,15 @@ class WorkflowRun:
         """End the tracked runs; print why jobs failed as the process ends, after all that Snakemake says."""
         tracked.end_runs(self._tracked, "FAILED", self._plan, self._made())
         logs = [Path(log).absolute() for job in self._workflow.scheduler.failed for log in job.log]
-        atexit.register(tell_last_words, logs)
+        if not self._end_log():  # ours has said why
+            atexit.register(tell_last_words, logs)
+
+    def _end_log(self) -> bool:
+        """End our log, so that others print after it, but not Snakemake; return whether there is one."""
+        if self.has_own_log:
+            self._workflow.logger_manager.queue_listener.stop()
+            self._workflow.logger_manager.get_log_handlers()[0].close()
+        return self.has_own_log
 
     def _made(self) -> set[str]:
         return {str(file) for job in self._workflow.dag.jobs for file in job.output}
@@ -167,7 +185,9 @@ def tell_last_words(logs: Iterable[Path]) -> None:
 
 
 def last_line(log: Path) -> str:
-    """Return the last line with text of a log; empty where there is none, or the job was interrupted."""
+    """Return the last line of a log, with its place in the code if it has one; "" of an interrupted job."""
     text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
-    line = text.rstrip().rpartition("\n")[2]
-    return "" if INTERRUPTED in line else line
+    before, _, line = text.rstrip().rpartition("\n")
+    places = re.findall(r'^  File "(.+)", line (\d+)', before.rpartition("Traceback")[2], re.MULTILINE)
+    at = f"{places[-1][0]}, line {places[-1][1]}: " if places and not line.startswith("texgs ") else ""
+    return "" if INTERRUPTED in line else f"{at}{line}"

@@ -39,12 +39,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write ballot.html, then key.json; print the questions."""
-    from texgs.core.check import torch_device
-    from texgs.core.io import write_bytes
-    from texgs.report.metrics_files import below, read_known, require_apart
-    from texgs.study.ballot_page import ballot_page
-    from texgs.study.questions import KINDS, Study, questions_of, write_key
-
     output = arguments.output or arguments.results / "study"
     key, page = output / KEY, output / PAGE
     if key.exists():
@@ -57,6 +51,12 @@ def run(arguments: argparse.Namespace) -> int:
         raise ArgumentError(f"--frames: expected at least 1, got {arguments.frames}")
     if not arguments.results.is_dir():
         raise ArgumentError(f"{arguments.results}: expected a folder of results, got none")
+    from texgs.core.check import torch_device
+    from texgs.core.io import write_bytes
+    from texgs.report.metrics_files import below, read_known, require_apart
+    from texgs.study.ballot_page import ballot_page
+    from texgs.study.questions import KINDS, Study, questions_of, write_key
+
     records, old = read_known(below(arguments.results))
     require_apart(records)
     for entry in old:

@@ -12,7 +12,7 @@ from hydra.errors import HydraException, MissingConfigException, OverrideParseEx
 from omegaconf.errors import OmegaConfBaseException
 
 from texgs.config.describe import keys
-from texgs.config.project import folders, members, short_path
+from texgs.config.project import folders, members, no_project, short_path
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 from texgs.core.keys import MissingKey, UnknownKey, ValueMismatch
@@ -56,6 +56,8 @@ def sentence(error: Exception) -> str:
         group, _, name = error.missing_cfg_file.partition("/")
         known = members(group)
         hint = close(name, known) or ("; an address goes to tracking.uri" if group == "tracking" else "")
+        if not hint and (outside := no_project()):
+            return f"{group}={name}: {outside}; texgs itself has {', '.join(known)}"
         hint = hint or f"; one of your own is a file, conf/{group}/{name}.yaml"
         return f"{where[0] if where else ''}{group}: expected one of {', '.join(known)}, got {name}{hint}"
     if isinstance(error, OverrideParseException):

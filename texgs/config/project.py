@@ -32,6 +32,14 @@ def own_folder() -> Path:
     return Path.cwd() / "conf"
 
 
+def no_project() -> str:
+    """Return how to get to a project from a working directory that is none; empty in a project."""
+    if own_folder().is_dir():
+        return ""
+    above = next((path for path in Path.cwd().parents if (path / "conf" / "dataset").is_dir()), "PROJECT")
+    return f"this folder has no conf/, so it is no project: cd {above}, or start one by texgs init FOLDER"
+
+
 def folders() -> tuple[Path, ...]:
     """Return the configuration folders; among files with the same name, the first folder wins."""
     own, shipped = own_folder(), ROOT / "conf"

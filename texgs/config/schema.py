@@ -58,7 +58,6 @@ class PageKeys:
     """Scenes of surfels as pages for a browser."""
 
     made: bool = key(True, "whether each scene and each new look becomes a page, scene.html")
-    embedded: float = key(4.0, "largest page that the report holds; it leads to others", "MiB", least=0)
 
 
 @dataclass(frozen=True)

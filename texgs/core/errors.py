@@ -44,6 +44,10 @@ class MissingDataError(ConfigError):
     """A data set's files are not on this machine; the message says how to get them."""
 
 
+class Stopped(TexgsError):
+    """Somebody has stopped the work; nobody has made a mistake."""
+
+
 class FitError(TexgsError, ArithmeticError):
     """A fit cannot go on."""
 

@@ -1,7 +1,7 @@
 """Dataclasses as schemas: how they declare keys, and plain values as instances of them."""
 
 import typing
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from functools import cache
@@ -139,6 +139,16 @@ def typed_argument(kind: type[T], values: Mapping[str, Any], key: str = "") -> T
             return typed(kind, values, key)
     except ValueMismatch as error:
         raise ArgumentError(str(error)) from error
+
+
+def require_keys(values: Any, keys: Collection[str] | None, where: str) -> None:
+    """Require a table with known keys; the error for an unknown key names the most similar one."""
+    if not isinstance(values, dict):
+        raise ArgumentError(f"{where}: expected a table of keys and values, got {values!r}")
+    for key in values if keys is not None else ():
+        if key not in keys:  # type: ignore[operator]
+            hint = close(key, keys or ()) or f"; expected {', '.join(keys or ())}"
+            raise ArgumentError(f"{where}: no such key {key!r}{hint}")
 
 
 def mismatch(key: str, expected: str, value: Any) -> ValueMismatch:

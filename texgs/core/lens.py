@@ -11,6 +11,10 @@ from texgs.core.keys import REQUIRED, key
 from texgs.core.names import require_numbers
 
 ORIGIN = (0.0, 0.0, 0.0)
+FRONT = -90.0  # azimuth of +z, degrees
+# Azimuth and polar angle of three views that are far apart, degrees. Their heights differ, too: what is round
+# about +y looks alike from all sides.
+SIGHTS = {"front": (FRONT, 20.0), "below": (30.0, -30.0), "above": (150.0, 50.0)}
 FILL_SHARE = 0.9  # share of the smaller side of an image that shows what is framed
 
 
@@ -36,6 +40,7 @@ class Frame:
         REQUIRED, "its centre [3]", "world units", least=-MAX_COORDINATE, most=MAX_COORDINATE
     )
     radius: float = key(REQUIRED, "its radius", "world units", above=0, most=MAX_COORDINATE)
+    azimuth: float = key(30.0, "of the camera that sees it first", "degrees", least=-360, most=360)
 
     def __post_init__(self) -> None:
         if len(self.target) != 3:

@@ -102,11 +102,20 @@ def named_file(where: str, folder: Path, path: object, kind: str = "a file") -> 
     return folder / str(path)
 
 
+def require_scene(path: Path) -> None:
+    """Require a scene, a folder with one or a model file that is there."""
+    if not path.exists():
+        raise ArgumentError(
+            f"{path}: no such scene, folder or model; check its name, or let texgs compose write a scene"
+        )
+
+
 def close(word: object, known: Iterable[str]) -> str:
-    """Return a hint at the known word that is most like the given one, or at both; empty where none is."""
-    similar = difflib.get_close_matches(str(word), list(known), n=2)
-    shares = [difflib.SequenceMatcher(None, each, str(word)).ratio() for each in similar]
-    alike = [each for each, share in zip(similar, shares, strict=True) if share == shares[0]]
+    """Return a hint at the known word that is most like the given one, or at both, whether capital or not."""
+    small, names = str(word).lower(), {each.lower(): each for each in known}
+    similar = difflib.get_close_matches(small, names, n=2)
+    shares = [difflib.SequenceMatcher(None, each, small).ratio() for each in similar]
+    alike = [names[each] for each, share in zip(similar, shares, strict=True) if share == shares[0]]
     return f", did you mean {' or '.join(sorted(alike))}?" if alike else ""
 
 

@@ -19,6 +19,7 @@ Watch = Callable[[str, int, int | None], None]
 LogPoint = Callable[[Mapping[str, float], int], None]
 
 SECONDS_BETWEEN_LINES = 5.0
+LINE = r": \d+(?: of \d+)? \w+, [\d.]+ (?:\w+/s|s/\w+)(?:, [\w ]+)?$"  # how lines of a log end
 _watch: ContextVar[Watch | None] = ContextVar("watch", default=None)
 _log: ContextVar[LogPoint | None] = ContextVar("log", default=None)
 
@@ -71,9 +72,9 @@ def progress(iterable: Iterable[T], total: int | None = None, *, title: str, uni
     """Yield the items of a loop; report on stderr how many are done, how fast, and the time left.
 
     A terminal or a notebook shows one moving bar. Anything else, such as the log file of a job, gets a plain
-    line at most every five seconds and one at the end, also where the loop was left early; none where there
-    is nothing to do. The rates of these lines are means since the start. The unit names one item, such as
-    "view".
+    line at most every second, later every five, and one at the end, also where the loop was left early; none
+    where there is nothing to do. The rates of these lines are means since the start. The unit names one item,
+    such as "view".
 
     Example:
         >>> list(progress("ab", title="letters", unit="letter"))
@@ -136,15 +137,15 @@ def _lines(iterable: Iterable[T], total: int | None, title: str, unit: str) -> I
             yield item
             done += 1
             now = monotonic()
-            if now - last >= SECONDS_BETWEEN_LINES and done != total:
-                left = f", {_duration((total - done) * (now - start) / done)} left" if total else ""
+            if now - last >= min(SECONDS_BETWEEN_LINES, max(1, (now - start) / 4)) and done != total:
+                left = f", {time_text((total - done) * (now - start) / done)} left" if total else ""
                 print(f"{title}: {_state(done, total, unit, now - start)}{left}", file=sys.stderr, flush=True)
                 last = now
         outcome = "took"
     finally:
         seconds = monotonic() - start
         if done or outcome != "took":  # else there was nothing to do
-            state = f"{_state(done, total, unit, seconds)}, {outcome} {_duration(seconds)}"
+            state = f"{_state(done, total, unit, seconds)}, {outcome} {time_text(seconds)}"
             print(f"{title}: {state}", file=sys.stderr, flush=True)
 
 
@@ -158,7 +159,7 @@ def _state(done: int, total: int | None, unit: str, seconds: float) -> str:
     return f"{count}, {rate:.1f} {unit}/s" if rate >= 1 else f"{count}, {1 / rate:.1f} s/{unit}"
 
 
-def _duration(seconds: float) -> str:
+def time_text(seconds: float) -> str:
     """Return a time in its two largest units: "10 s", "3 min 05 s", "2 h 07 min"."""
     whole = round(max(seconds, 0))
     if whole < 60:

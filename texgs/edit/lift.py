@@ -110,7 +110,7 @@ def lift(
 
 @torch.no_grad()
 def view_mask(model: Surfels, clicks: Clicks, masks: MaskModel, light: Light) -> Tensor:
-    """Return the mask [H, W] bool of a view; clicks outside the visible part are dropped.
+    """Return the mask [H, W] bool of a view, of what the model shows there; clicks outside are dropped.
 
     The mask model sees a crop around the visible part, so that the object is larger.
     """
@@ -123,10 +123,11 @@ def view_mask(model: Surfels, clicks: Clicks, masks: MaskModel, light: Light) ->
     inside = (moved >= 0).all(1) & (moved < moved.new_tensor([cut.width, cut.height])).all(1)
     mask = torch.zeros(camera.height, camera.width, dtype=torch.bool, device=image.device)
     part = slice(box.top, box.bottom), slice(box.left, box.right)
-    held = None if clicks.held is None else clicks.held[part] & (shown.alpha >= FAINT)
+    is_shown = shown.alpha >= FAINT
+    held = None if clicks.held is None else clicks.held[part] & is_shown
     if held is not None or bool(clicks.positive[inside].any()):
-        found = masks(image, moved[inside], clicks.positive[inside], held)
-        mask[part] = found if held is None else found & held
+        chosen = masks(image, moved[inside], clicks.positive[inside], held, is_shown)
+        mask[part] = chosen & (is_shown if held is None else held)
     return mask
 
 

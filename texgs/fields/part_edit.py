@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
+from texgs.core.colors import Color, color
 from texgs.core.errors import ArgumentError
+from texgs.core.keys import require_keys
 from texgs.core.names import is_number
 from texgs.fields.kinds import kinds
 
@@ -11,6 +13,7 @@ MAX_FACTOR = 1000.0  # a larger factor is a typing error
 MAX_OPACITY = 1 - 1e-6  # opacity with a finite logit
 # Capability of a field that each value of an edit requires; all other values are factors of a material.
 NEEDS = {"visible": "opacity", "opacity": "opacity", "palette": "palette"}
+LOOKS = ("style", "picture", "instruction")  # keys of looks, which are not changes of numbers
 
 
 @dataclass(frozen=True)
@@ -22,13 +25,13 @@ class PartEdit:
     """
 
     visible: bool = True
-    palette: tuple[float, float, float] | None = None  # colour in [0, 1]; None: as fitted
+    palette: Color | None = None  # colour in [0, 1]; None: as fitted
     opacity: float = 1.0  # factor on opacities, which stay at most 1
     ambient: float = 1.0  # factors on k_a, k_d, k_s and beta
     diffuse: float = 1.0
     specular: float = 1.0
     shininess: float = 1.0
-    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)  # colour of highlights in [0, 1]
+    tint: Color = (1.0, 1.0, 1.0)  # colour of highlights in [0, 1]
 
     def __post_init__(self) -> None:
         if not isinstance(self.visible, bool):
@@ -45,6 +48,17 @@ class PartEdit:
     def material(self) -> tuple[object, ...]:
         """Return the changed values of the material."""
         return (self.ambient, self.diffuse, self.specular, self.shininess, self.tint)
+
+
+EDIT_KEYS = tuple(each.name for each in fields(PartEdit))
+SEGMENT_KEYS = ("file", "texture", *EDIT_KEYS)  # of a part of a scene
+
+
+def require_part_key(word: str) -> None:
+    """Require that parts of scenes have the key of a change such as TF01.opacity=0.5; other words pass."""
+    part, dot, key = word.partition("=")[0].rpartition(".")
+    if dot and part != "cut" and key not in LOOKS and "/" not in key:
+        require_keys({key: None}, SEGMENT_KEYS, f"models.{part.replace('/', '.segments.')}")
 
 
 def require_possible(edit: PartEdit, kind: str) -> None:
@@ -68,18 +82,3 @@ def opacity_factors(edits: Sequence[PartEdit] | None, count: int, kind: str) -> 
     for edit in edits:
         require_possible(edit, kind)
     return [edit.opacity if edit.visible else 0.0 for edit in edits]
-
-
-def color(name: str, value: object) -> tuple[float, float, float]:
-    """Return red, green and blue in [0, 1] from a list, or from hexadecimal text such as "#ffd27f"."""
-    channels: object = value
-    if isinstance(value, str) and len(value) == 7 and value[0] == "#":
-        try:
-            channels = [int(value[i : i + 2], 16) / 255 for i in (1, 3, 5)]
-        except ValueError:
-            channels = value
-    numbers = channels if isinstance(channels, list | tuple) else ()
-    if len(numbers) != 3 or not all(is_number(x) and 0 <= x <= 1 for x in numbers):
-        raise ArgumentError(f"{name}: expected three numbers from 0 to 1 or #rrggbb, got {value!r}")
-    red, green, blue = (float(x) for x in numbers)
-    return red, green, blue

@@ -142,10 +142,8 @@ class MeasuredScene:
     @cached_property
     def frame(self) -> Callable[[int], Render]:
         """Return a cached renderer of the edited scene along the path."""
-        scene = self.after
-        return lru_cache(LAST_FRAMES)(
-            lambda place: self.shown.render(self.cameras[place], scene.light, scene.edits)
-        )
+        shown, scene, cameras = self.shown, self.after, self.cameras  # not self, which would keep itself
+        return lru_cache(LAST_FRAMES)(lambda place: shown.render(cameras[place], scene.light, scene.edits))
 
     @cached_property
     def vgg(self) -> Vgg | None:

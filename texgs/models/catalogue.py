@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from texgs.core.errors import ArgumentError
+from texgs.core.names import close
 
 
 @dataclass(frozen=True)
@@ -156,5 +157,6 @@ def entry_of(name: str) -> Single | Snapshot:
     if pinned := PINNED_PATTERN.fullmatch(name):
         return Pipeline(pinned[1], pinned[2])
     if name not in CATALOGUE:
-        raise ArgumentError(f"weights: expected one of {', '.join(CATALOGUE)} or {HUB}, got {name!r}")
+        expected = f"one of {', '.join(CATALOGUE)} or {HUB}"
+        raise ArgumentError(f"weights: expected {expected}, got {name!r}{close(name, CATALOGUE)}")
     return CATALOGUE[name]

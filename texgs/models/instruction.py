@@ -2,9 +2,8 @@
 
 import re
 
+from texgs.core.colors import Color, channels
 from texgs.core.errors import ArgumentError
-
-Color = tuple[float, float, float]  # red, green, blue in [0, 1]
 
 WORDS = {  # for a filter, by its name
     "stipple drawing": ("stipple", "stippled", "stippling", "dots", "pointillism"),
@@ -55,23 +54,10 @@ def understand(instruction: str) -> tuple[str, Color | None]:
     for name, synonyms in WORDS.items():
         if any(asked in (word, f"{word} pencil", f"pencil {word}") for word in synonyms):
             return name, None
-    color = named_color("".join(words))
-    if color is not None:
-        return f"colour {asked}", color
+    if found := channels("".join(words)):
+        red, green, blue, *_ = found
+        return f"colour {asked}", (red, green, blue)
     raise ArgumentError(
         f"instruction: expected one of {', '.join(vocabulary())}; got {text!r}, which needs "
         "guidance=instruct_pix2pix"
     )
-
-
-def named_color(name: str) -> Color | None:
-    """Return red, green and blue of a CSS colour name or #rrggbb, or None."""
-    from PIL import ImageColor
-
-    if name not in ImageColor.colormap and not name.startswith("#"):
-        return None
-    try:
-        red, green, blue, *_ = ImageColor.getrgb(name)
-    except ValueError:
-        return None
-    return red / 255, green / 255, blue / 255

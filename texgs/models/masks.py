@@ -21,6 +21,7 @@ ALIKE_CHANNELS = 16  # of 255: largest difference per channel within a click's o
 PLAIN_CHANNELS = 20  # of 255, within an empty background; smaller values split it
 ROUNDS = 5
 FEW_SHARE = 0.1  # smallest mask relative to the outline; smaller ones are unreliable
+Pixels = Tensor | None  # [H, W] bool
 
 
 class MaskModel(Protocol):
@@ -28,11 +29,14 @@ class MaskModel(Protocol):
 
     name: str  # for tables and files
 
-    def __call__(self, image: Tensor, points: Tensor, positive: Tensor, held: Tensor | None = None) -> Tensor:
+    def __call__(
+        self, image: Tensor, points: Tensor, positive: Tensor, held: Pixels = None, shown: Pixels = None
+    ) -> Tensor:
         """Return the object in an image [H, W, 3] as shown on a screen, [H, W] bool, on its device.
 
         Points [P, 2] are right and down in pixels; the centre of the first pixel is (0.5, 0.5). At least one
-        is positive [P] bool, unless an outline says which pixels [H, W] bool the object is among.
+        is positive [P] bool, unless an outline says which pixels the object is among. What is not shown, by
+        default nothing, is background; callers cut it off masks.
         """
 
 
@@ -75,15 +79,18 @@ class Remembered:
 class GrabCut:
     """A mask model without learned weights: the offline counterpart of SAM (Rother et al. 2004).
 
-    It separates objects by colour and contrast. A plain border of the image is background, and so is what
-    this separates from all positive clicks. Of the rest, what is connected to a click and of its colour is
-    taken for the object at first, or not, as the click says; Gaussian mixtures of the colours of both and a
-    minimal cut then move the outline. What a user drew around is taken at first, all of it.
+    It separates objects by colour and contrast, whatever is said to be shown. A plain border of the image is
+    background, and so is what this separates from all positive clicks. Of the rest, what is connected to a
+    click and of its colour is taken for the object at first, or not, as the click says; Gaussian mixtures of
+    the colours of both and a minimal cut then move the outline. What a user drew around is taken at first,
+    all of it.
     """
 
     name = "GrabCut"
 
-    def __call__(self, image: Tensor, points: Tensor, positive: Tensor, held: Tensor | None = None) -> Tensor:
+    def __call__(
+        self, image: Tensor, points: Tensor, positive: Tensor, held: Pixels = None, shown: Pixels = None
+    ) -> Tensor:
         """Return the object [H, W] bool in an image, on the image's device; see `MaskModel`."""
         check_clicks(image, points, positive, held)
         shape = (image.shape[0], image.shape[1])

@@ -9,12 +9,13 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from texgs.core.errors import ArgumentError
-from texgs.models.masks import GrabCut, MaskModel, Remembered, check_clicks
+from texgs.models.masks import GrabCut, MaskModel, Pixels, Remembered, check_clicks
 from texgs.models.networks import fast_dtype, read_folder, read_tensors
 from texgs.models.weights import locate
 
 MEAN = (123.675 / 255, 116.28 / 255, 103.53 / 255)  # per channel, of the encoder's training images
 DEVIATION = (58.395 / 255, 57.12 / 255, 57.375 / 255)
+NEARLY = 0.1  # masks whose qualities differ by less are equally good
 PUBLISHED_NETWORKS = {  # title, and architecture in kornia, by name in the catalogue
     "mobile_sam": ("MobileSAM", "mobile_sam"),  # Zhang et al. 2023
     "sam_vit_h": ("SAM ViT-H", "vit_h"),  # the paper's
@@ -30,9 +31,9 @@ Decode = Callable[[Tensor, Tensor, Tensor, Tensor | None, bool], Masks]
 class Sam:
     """A mask model; the features of an image are computed once for all clicks on it.
 
-    One click is ambiguous (a wheel, or the car): of the three masks that the model offers for it, the one
-    that it thinks best is taken. For several clicks, or the box around an outline, it gives one mask. The
-    encoder takes square images of so many pixels a side.
+    One click is ambiguous (a wheel, or the car): the model offers three masks for it, see `best_of`. For
+    several clicks, or the box around an outline, it gives one mask. The encoder takes square images of so
+    many pixels a side.
     """
 
     def __init__(
@@ -58,7 +59,9 @@ class Sam:
         return max(int(height * scale + 0.5), 1), max(int(width * scale + 0.5), 1)
 
     @torch.no_grad()
-    def __call__(self, image: Tensor, points: Tensor, positive: Tensor, held: Tensor | None = None) -> Tensor:
+    def __call__(
+        self, image: Tensor, points: Tensor, positive: Tensor, held: Pixels = None, shown: Pixels = None
+    ) -> Tensor:
         """Return the object [H, W] bool in an image, on the image's device; see `MaskModel`."""
         check_clicks(image, points, positive, held)
         shape = (image.shape[0], image.shape[1])
@@ -71,9 +74,24 @@ class Sam:
             at = held.nonzero().flip(1)
             box = (torch.stack([at.amin(0), at.amax(0) + 1]) * scale - 0.5).to(self.device).reshape(1, 4)
         logits, quality = self._decode(self._features(image), places, labels, box, several)
-        best = logits[quality.argmax()][None, None].float()
-        square = F.interpolate(best, (self.size, self.size), mode="bilinear")[..., :height, :width]
-        return (F.interpolate(square, shape, mode="bilinear")[0, 0] > 0).to(image.device)
+        square = F.interpolate(logits[None].float(), (self.size, self.size), mode="bilinear")
+        found = F.interpolate(square[..., :height, :width], shape, mode="bilinear")[0] > 0
+        return best_of(found.to(image.device), quality.to(image.device), points.long(), shown)
+
+
+def best_of(masks: Tensor, quality: Tensor, points: Tensor, shown: Pixels = None) -> Tensor:
+    """Return the smallest of masks [K, H, W] bool that are nearly as good as the best, [H, W].
+
+    A mask is as good as the model thinks, quality [K], times the share of it on what is shown; it has to hold
+    the first of the points [P, 2], where one does.
+    """
+    on_it = masks if shown is None else masks & shown
+    sizes = on_it.sum(dim=(1, 2))
+    scores = quality * sizes / masks.sum(dim=(1, 2)).clamp_min(1)
+    if len(points):
+        holds = on_it[:, points[0, 1], points[0, 0]]
+        scores = torch.where(holds | ~holds.any(), scores, -torch.inf)
+    return masks[torch.where(scores >= scores.max() - NEARLY, sizes, masks[0].numel() + 1).argmin()]
 
 
 def published_sam(

@@ -9,9 +9,10 @@ torch and Python. A module declares the structures and functions that it calls.
 import ctypes
 import sys
 import weakref
-from collections.abc import Iterable
-from contextlib import nullcontext
-from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_int64, c_void_p
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, nullcontext
+from contextvars import ContextVar
+from ctypes import POINTER, Structure, addressof, c_char_p, c_double, c_float, c_int32, c_int64, c_void_p
 from functools import cache
 from pathlib import Path
 from threading import Lock
@@ -21,17 +22,18 @@ import torch
 from torch import Tensor
 
 from texgs.core import memory
-from texgs.core.errors import ArgumentError, DeviceError, NativeError, OutOfMemoryError
+from texgs.core.errors import ArgumentError, DeviceError, NativeError, OutOfMemoryError, Stopped
 from texgs.core.native_sources import SUFFIX, built_from, library_sources
 
-ABI_VERSION = 9
+ABI_VERSION = 10
 FOLDER = Path(__file__).parent / "_native"
 CSRC = Path(__file__).parent / "csrc"
 INSTALL_ADVICE = "install texgs again (pip install .)"
-ERRORS = {1: ArgumentError, 2: OutOfMemoryError, 3: DeviceError}
+ERRORS = {1: ArgumentError, 2: OutOfMemoryError, 3: DeviceError, 4: Stopped}
 PASSES = ("project", "sort", "bin", "forward", "backward", "reduce")  # in the order of `texgs_pass`
 TYPES = {"p": c_void_p, "i": c_int32, "n": c_int64, "f": c_float}
 DECLARATIONS: dict[str, tuple[list[Any], Any]] = {}  # arguments and result of each function of the libraries
+_stop: ContextVar[c_int32 | None] = ContextVar("stop", default=None)
 
 
 def fields(layout: str) -> list[tuple[str, Any]]:
@@ -98,7 +100,7 @@ for _name, _result, _arguments in (
     ("texgs_require_memory", c_int32, "n"),
     ("texgs_trim", None, ""),
     ("texgs_use_openmp", None, "p"),
-    ("texgs_set_threads", None, "i"),
+    ("texgs_set_loops", None, "ip"),
     ("texgs_memory", c_int64, "i"),
     ("texgs_pass_seconds", None, "p"),
 ):
@@ -198,6 +200,19 @@ def pass_seconds() -> dict[str, float]:
     return dict(zip(PASSES, seconds, strict=True))
 
 
+@contextmanager
+def stopped_by(flag: c_int32) -> Iterator[None]:
+    """Make calls of this thread raise Stopped once another thread sets a flag, within the block.
+
+    A call on a CPU ends within milliseconds, and its outputs are unfinished; one on a GPU goes on.
+    """
+    before = _stop.set(flag)
+    try:
+        yield
+    finally:
+        _stop.reset(before)
+
+
 def call(name: str, *arguments, device: torch.device) -> None:
     """Call a function of the library for `device` with its current stream as the last argument.
 
@@ -205,7 +220,8 @@ def call(name: str, *arguments, device: torch.device) -> None:
     """
     lib = library(device.type)
     if device.type == "cpu":
-        function(lib, "texgs_set_threads")(threads())
+        flag = _stop.get()
+        function(lib, "texgs_set_loops")(threads(), None if flag is None else addressof(flag))
         stream = None
     else:
         stream = torch.cuda.current_stream(device).cuda_stream

@@ -8,15 +8,13 @@ import numpy as np
 import torch
 
 from texgs.core.figures import new_figure, words, write_figure, write_grid
-from texgs.core.lens import Lens
+from texgs.core.lens import SIGHTS, Lens
 from texgs.core.progress import progress
 from texgs.fields.kinds import Kind
 from texgs.scene.film import Film, frames_of
 from texgs.scene.scene import Scene
-from texgs.volume.cameras import FRONT, orbit_path
+from texgs.volume.cameras import sights
 
-POLAR = 20.0  # degrees
-VIEW_COUNT = 3  # around the object
 SIDE_LIGHT = (-30.0, 40.0)  # azimuth and polar angle of a light that no edit has seen, degrees
 SIZE = 512  # pixels of a picture
 TURNTABLE_FRAMES = 36  # frames of the turntable
@@ -26,8 +24,8 @@ def write_before_and_after(
     before: Scene, after: Scene, kind: Kind, lens: Lens, output: Path, device: torch.device, title: str
 ) -> None:
     """Write edit.png, views of both, under another light where they can be relit too, and turntable.mp4."""
-    cameras = orbit_path(VIEW_COUNT, POLAR, lens.square(SIZE))
-    lights, titles = [before.light] * VIEW_COUNT, [f"view {index + 1}" for index in range(VIEW_COUNT)]
+    titles, cameras = map(list, zip(*sights(lens.square(SIZE)).items(), strict=True))
+    lights = [before.light] * len(cameras)
     if "relight" in kind.can:
         cameras, lights, titles = (
             [*cameras, cameras[0]],
@@ -41,10 +39,9 @@ def write_before_and_after(
         shown = frames_of(scene, seen, device)
         rows[name] = list(progress(shown, len(cameras), title=f"{title}, {name}", unit="picture"))
     write_grid(output / "edit.png", rows, titles)
-    film, turned = (
-        Film(what="orbit", frames=TURNTABLE_FRAMES, azimuth=FRONT, polar=POLAR),
-        lens.square(kind.film_size),
-    )
+    azimuth, polar = SIGHTS["front"]
+    film = Film(what="orbit", frames=TURNTABLE_FRAMES, azimuth=azimuth, polar=polar)
+    turned = lens.square(kind.film_size)
     halves = [frames_of(scene, film.shots(scene, lens=turned), device) for scene in scenes.values()]
     frames = (np.concatenate(pair, axis=1) for pair in zip(*halves, strict=True))
     film.write(output / "turntable.mp4", frames, title=f"{title}, turntable")

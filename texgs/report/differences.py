@@ -13,6 +13,7 @@ from texgs.core.keys import typed
 from texgs.core.plain_yaml import parse_yaml
 from texgs.edit.method import NO_METHOD, method_of
 from texgs.report.metrics_files import Record, of
+from texgs.report.published import are_of_paper
 from texgs.report.results import EditResult, FitResult, SheetResult
 from texgs.report.table import Column, Table, report_file
 
@@ -107,11 +108,11 @@ def differences(
 
 
 def differences_of(records: Sequence[Record[Any]]) -> Table:
-    """Return the differences of some jobs' recipes and edits from the paper; perhaps no rows."""
+    """Return the differences of some jobs' recipes and edits from the paper; no rows for other data."""
     recipes = sorted({record.recipe for record in of(FitResult, records)})
     edits = sorted({record.result.edit for record in of(EditResult, records)})
     table = differences(recipes, edits, views_of(records))
-    return table if recipes else replace(table, rows=[])
+    return table if recipes and are_of_paper(records) else replace(table, rows=[])
 
 
 def views_of(records: Sequence[Record[Any]]) -> dict[str, dict[int, list[str]]]:

@@ -22,7 +22,7 @@ from texgs.volume.view_set import View, ViewSet
 
 VISIBLE_ALPHA = 2 / 255  # alpha
 ERROR_GAIN = 4  # an error of a quarter has the full colour
-DIVERGING = "bwr"  # 0 is white
+DIVERGING = "bwr"  # of matplotlib; 0 is white
 ERROR = Scale(-1 / ERROR_GAIN, 1 / ERROR_GAIN, DIVERGING)  # red where too bright, blue where too dark
 MARGIN = 1.06  # side of the shown crop, relative to the visible part
 KEY = Cell("", words="of the worst channel\nred: too bright\nblue: too dark")
@@ -109,7 +109,7 @@ def compare(models: Mapping[str, Field], view: View, reduce: int) -> tuple[list[
         color = image.color.cpu().clamp(0, 1)
         visible = visible | (image.alpha.cpu() > VISIBLE_ALPHA)
         cells.append(Cell(phase, color, f"PSNR {psnr(color, truth):.2f} dB"))
-    cells.append(Cell(f"error × {ERROR_GAIN} ({DIVERGING})", ERROR(signed_error(color, truth)), scale=ERROR))
+    cells.append(Cell("error (red: too bright)", ERROR(signed_error(color, truth)), scale=ERROR))
     return cells, visible
 
 
@@ -125,7 +125,7 @@ def maps(model: Field, view: View, reduce: int) -> list[Cell]:
     has_normals = isinstance(model, Surfels)
     image = model.render(camera, view.light, outputs=("normal", "depth") if has_normals else ("depth",))
     alpha, depth = image.alpha.cpu(), image.depth.cpu()  # type: ignore[union-attr]
-    cover, grey = alpha[..., None], Scale(0, 1, "gray_r")
+    cover, grey = alpha[..., None], Scale(0, 1, "gray")
     cells = [map_cell("depth, world units", depth, alpha), Cell("alpha", grey(alpha), scale=grey)]
     if not isinstance(model, Surfels):
         return cells

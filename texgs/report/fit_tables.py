@@ -122,7 +122,7 @@ def meshes(records: Iterable[Record[Any]]) -> Table:
     """Return the table of surfaces of fits against isosurfaces of their volumes."""
     caption = (
         "Meshes fused from depth, against what training views see of the isosurface. Lengths in world units: "
-        "the longest side of a volume is 1. The paper shows this comparison as a picture only."
+        "the longest side of a volume is 1."
     )
     measured = columns("meshes")
     rows = [

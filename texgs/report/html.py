@@ -1,17 +1,21 @@
 """One HTML report of a run: tables, pictures, curves, and the origin of each."""
 
+import os
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from PIL import Image
 
 from texgs.core.figures import as_picture, new_figure, words
 from texgs.core.io import write_bytes
 from texgs.report.metrics_files import LeftOut, Record, of
+from texgs.report.overview import overviews_of
 from texgs.report.published import PAPER_LABEL, in_order
 from texgs.report.results import SECTIONS, FitResult
-from texgs.report.sections import Figure, data_uri, figures
+from texgs.report.sections import Figure, data_uri, figures, held_pages
 from texgs.report.sweep_figure import sweep_figure
 from texgs.report.table import SOURCES, Table, report_file
 from texgs.report.tables import specs, sweeps_of, tables_of
@@ -42,7 +46,7 @@ def write_report(
     given: Mapping[str, Table] | None = None,
     more: Mapping[str, Sequence[Figure]] | None = None,
 ) -> Path:
-    """Write a report that needs no other files, except pages of scenes too large to embed.
+    """Write a report that needs no other files, except pages of scenes that would make it too large to mail.
 
     Tables by name and figures by section that need more than records are `given` and `more`.
     """
@@ -50,14 +54,19 @@ def write_report(
 
     template = report_file("report.html.j2")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    pictures = figures(records, Path(path).resolve().parent)
+    pictures = figures(records)
     pictures["fitting"] += loss_figures(records)
-    for name in sweeps_of(records):
-        drawn = data_uri(sweep_figure(records, name))
-        pictures["ablations"].append(Figure(f"sweep {name}", "", SWEEP_CAPTION, drawn, ""))
+    pictures["ablations"] += sweep_figures(records)
     for section, own in (more or {}).items():
         pictures[section] += own
+    overviews = overviews_of(records, pictures.pop("overview"))
+    shown = [*chain(*pictures.values()), *chain(*(each.figures for each in overviews))]
+    folder = Path(path).resolve().parent
     text = environment.from_string(template).render(
+        title=", ".join(each.title for each in overviews),
+        overviews=overviews,
+        held=held_pages(shown),
+        link=lambda page: quote(Path(os.path.relpath(page, folder)).as_posix()),
         sections=sections(records, tables_of(records, left_out, given), pictures),
         left_out=left_out,
         jobs=[job(record.facts) for record in records],
@@ -80,7 +89,7 @@ def sections(
     for key, title in SECTIONS.items():
         own = {name: table for name, table in tables.items() if not table.is_empty and places[name] == key}
         by_dataset: dict[str, list[Figure]] = {}
-        for figure in pictures[key]:
+        for figure in pictures.get(key, ()):
             by_dataset.setdefault(figure.dataset, []).append(figure)
         if own or by_dataset:
             shown.append({"key": key, "title": title, "tables": own, "figures": by_dataset})
@@ -95,6 +104,12 @@ def loss_figures(records: Sequence[Record[Any]]) -> list[Figure]:
             by_dataset.setdefault(record.title, []).append(record)
     drawn = {title: data_uri(curves(phases)) for title, phases in by_dataset.items()}
     return [Figure(title, "", LOSS_CAPTION, uri, "", is_narrow=True) for title, uri in drawn.items()]
+
+
+def sweep_figures(records: Sequence[Record[Any]]) -> list[Figure]:
+    """Draw the measures and scenes of each sweep."""
+    drawn = {name: data_uri(sweep_figure(records, name)) for name in sweeps_of(records)}
+    return [Figure(f"sweep {name}", "", SWEEP_CAPTION, uri, "") for name, uri in drawn.items()]
 
 
 def curves(phases: Sequence[Record[FitResult]]) -> Image.Image:

@@ -19,11 +19,6 @@ R = TypeVar("R", bound=Record[Any])
 PAPER_LABEL = "the paper"  # recipe in rows of the paper
 RECIPE = "paper"  # file of conf/fit with results comparable to the paper's
 VIEWS = 162  # default number of training views in the paper
-COMPARED_FACTS = (
-    "Numbers of the paper stand beside ours where recipe, size of images and number of training views are "
-    f"the paper's; elsewhere there is {UNLIKE_CELL}, not like for like. Its transfer functions are not "
-    "published: even there scenes differ, so that PSNR, SSIM and primitives are not like for like."
-)
 DATA, LABEL = "data set", "recipe"  # titles of columns
 # Size and number of views, and changes of the recipe, in rows: means are over fits of the same.
 VIEWS_COLUMN = "seen"
@@ -61,6 +56,11 @@ def images(dataset: str) -> int | None:
 def intended_dataset(record: Record[Any]) -> str:
     """Return the data set of a job, or the one it replaces."""
     return record.stand_in.replace(" ", "_") or record.dataset
+
+
+def are_of_paper(records: Iterable[Record[Any]]) -> bool:
+    """Return whether some jobs are of the paper's data sets, or of stand-ins for them."""
+    return any(intended_dataset(record) in volumes() for record in records)
 
 
 def in_order(records: Iterable[R]) -> list[R]:
@@ -129,7 +129,7 @@ def beside_paper(
     names = [*map(Column, (DATA, LABEL, *keys.values())), SCENES]
     published = [Column(each.title + PAPER, each.digits, UNPUBLISHED_CELL) for each in columns.values()]
     shown = side_by_side(ours, theirs, ("published", *keys.values()), titles)
-    return Table(COMPARED_FACTS, [*names, *columns.values(), *published], shown)
+    return Table("", [*names, *columns.values(), *published], shown)
 
 
 def grouped(rows: Rows, keys: Sequence[str], titles: Sequence[str], is_sum: bool) -> DataFrame:

@@ -12,19 +12,20 @@ from texgs.core.errors import ConfigError
 from texgs.core.keys import typed
 from texgs.core.names import close
 
-SECTIONS = {  # of the report, in the order of the paper
-    "data": "Data sets and views",
+SECTIONS = {  # of the report, in its order: scenes, then as in the paper
+    "overview": "At a glance",
     "scenes": "Scenes to open",
-    "fitting": "Fitting",
-    "pse": "Editing of colour, opacity and light",
-    "relight": "Relighting",
+    "data": "Data sets and views",
+    "fitting": "Quality of the fits",
+    "pse": "Edits of colour, opacity and light",
+    "relight": "Other lights",
     "time": "Through time",
-    "image": "Image-driven editing",
-    "text": "Text-driven editing",
-    "parts": "Partial editing and other edits",
-    "ablations": "Ablations",
-    "sizes": "Model sizes",
-    "rendering": "Rendering",
+    "image": "Looks from pictures",
+    "text": "Looks from words",
+    "parts": "Segments and other edits",
+    "ablations": "Sweeps and ablations",
+    "sizes": "Sizes of models",
+    "rendering": "Speed of rendering",
     "study": "User study",
     "differences": "Where we differ from the paper",
     "more": "Further tables and figures",
@@ -159,7 +160,7 @@ class MeshResult(Result, section="fitting"):
 
 
 @dataclass(frozen=True)
-class SceneResult(Result, section="pse"):
+class SceneResult(Result, section="overview"):
     """Fields as one scene."""
 
     models: int
@@ -242,7 +243,6 @@ class PageResult(Result, section="scenes"):
     edit: str  # or "none"
     primitives: int
     page_mib: float
-    is_embedded: bool  # whether the report embeds it
 
 
 @dataclass(frozen=True)

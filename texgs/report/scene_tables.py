@@ -11,10 +11,10 @@ from texgs.report.published import (
     LABEL,
     PAPER_LABEL,
     SCENES,
+    are_of_paper,
     cells,
     images,
     in_order,
-    intended_dataset,
     mean,
     mean_rows,
     paper,
@@ -35,8 +35,7 @@ def datasets(records: Iterable[Record[Any]]) -> Table:
     """Return the table of all data sets, with times of the volume renderer by view size."""
     caption = (
         "Times are means over basic scenes of the median view; VTK renders the first metric.vtk_frames test "
-        "views. Where there is no volume, the views are as published. The paper: ParaView on an RTX 4090, "
-        "its volumes as 32-bit floats."
+        "views. Where there is no volume, the views are as published."
     )
     records = list(records)
     own = {record.dataset: record for record in of(VolumeResult, records)}
@@ -93,7 +92,7 @@ def rendering(records: Iterable[Record[Any]]) -> Table:
     rows = [timing_row(record) for record in timings]
     titles = [*columns("rendering")][5:]
     means = mean_rows(rows, (LABEL, "pixels", "device", "threads"), titles)
-    if any(intended_dataset(record) in volumes() for record in timings):
+    if are_of_paper(timings):
         means += [published_time("image", "800x800"), published_time("text", "512x512")]
     return Table("", [*columns("rendering").values()], [*rows, *means])
 

@@ -1,25 +1,26 @@
-"""The sections of the report in the paper's order, and the figures of each."""
+"""The figures of each section of the report, and the pages of scenes that it holds."""
 
 import base64
 import io
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
 from PIL import Image
 
 from texgs.core.names import PAGE
 from texgs.edit.method import NO_METHOD
-from texgs.report.metrics_files import Record
+from texgs.report.edit_tables import words_of
+from texgs.report.metrics_files import Record, of
 from texgs.report.published import in_order
 from texgs.report.results import SECTIONS, EditResult, GalleryResult, PageResult
 
 SECTIONS_OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what they follow
 NARROW_WIDTH = 1000  # pixels; narrower pictures stand side by side
+AS_FITTED = "as fitted"  # label of a scene without an edit
+MAILED = 18 * 10**6  # bytes of a report that holds pages: as an attachment they are the 25 MB of a mail
 WEBP_QUALITY, WEBP_EFFORT = 85, 2  # full quality is in the folders of jobs
 
 
@@ -33,43 +34,51 @@ class Figure:
     uri: str
     command: str  # command line that makes it
     is_narrow: bool = False
-    page: str = ""  # page with the same scene, as JSON; or
-    link: str = ""  # path of the page
+    page: Path | None = None  # file of a page with the same scene
 
 
-def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figure]]:
-    """Return all pictures of jobs by section and data set; for sweeps, only pictures of all variants.
+def figures(records: Sequence[Record[Any]]) -> dict[str, list[Figure]]:
+    """Return all pictures of jobs by section, in order; for sweeps, only pictures of all variants.
 
-    Links to larger pages begin at the folder of the report.
+    Scenes as fitted come before edits.
     """
     by_section: dict[str, list[Figure]] = {name: [] for name in SECTIONS}
-    for record in in_order(records):
+    has_one = len({record.label for record in records if record.label}) == 1
+    edits = {(each.dataset, each.label, each.result.edit): each.result for each in of(EditResult, records)}
+    for record in sorted(in_order(records), key=lambda each: edit_of(each) not in ("", AS_FITTED)):
         is_of_all = isinstance(record.result, GalleryResult) or not record.is_swept
         for name, words in record.facts.get("pictures", {}).items() if is_of_all else ():
             file = record.path.with_name(name)
-            if file.is_file() and (figure := figure_of(record, file, words, folder)):
+            edit = edits.get((record.dataset, record.label, edit_of(record)))
+            if edit and edit.followed and isinstance(record.result, PageResult):
+                words = f"It follows: {words_of(edit.followed)}."
+            if file.is_file() and (figure := figure_of(record, file, words, has_one)):
                 by_section[section_of(record, file)].append(figure)
     return by_section
 
 
-def figure_of(record: Record[Any], file: Path, words: str, folder: Path) -> Figure | None:
-    """Return a picture of a job, with a page or a link from a folder; None for films, which are too large."""
+def figure_of(record: Record[Any], file: Path, words: str, has_one: bool) -> Figure | None:
+    """Return a picture of a job, with the page if it has one; None for films, which are too large."""
     with Image.open(file) as picture:
         if getattr(picture, "is_animated", False):
             return None
         uri, is_narrow = data_uri(picture), picture.width <= NARROW_WIDTH
     command = str(record.facts.get("command", ""))
-    return Figure(record.title, label(record), words, uri, command, is_narrow, *page(record, folder))
+    page = record.path.with_name(PAGE) if isinstance(record.result, PageResult) else None
+    own = page if page and page.is_file() else None
+    return Figure(record.title, label(record, has_one), words, uri, command, is_narrow, own)
 
 
-def page(record: Record[Any], folder: Path) -> tuple[str, str]:
-    """Return the page of a scene, or a link to it, if a job has made one; the other is empty."""
-    file = record.path.with_name(PAGE)
-    if not isinstance(record.result, PageResult) or not file.is_file():
-        return "", ""
-    if record.result.is_embedded:
-        return json.dumps(file.read_text(encoding="utf-8")).replace("</", r"<\/"), ""
-    return "", quote(Path(os.path.relpath(file, folder)).as_posix())
+def held_pages(shown: Sequence[Figure]) -> dict[Path, str]:
+    """Return the pages that a report with some figures holds, as JSON by file: the smallest, to `MAILED`."""
+    room, held = MAILED - sum(len(figure.uri) for figure in shown), dict[Path, str]()
+    pages = [figure.page for figure in shown if figure.page]
+    for page in sorted(pages, key=lambda page: page.stat().st_size):
+        text = json.dumps(page.read_text(encoding="utf-8")).replace("</", r"<\/")
+        if (room := room - len(text)) < 0:
+            break
+        held[page] = text
+    return held
 
 
 def section_of(record: Record[Any], picture: Path) -> str:
@@ -83,15 +92,15 @@ def section_of(record: Record[Any], picture: Path) -> str:
     return picture.stem if picture.stem in SECTIONS else result.pictured_in
 
 
-def label(record: Record[Any]) -> str:
-    """Return a label of a job: basic TF, fit and edit, if any."""
-    return " ".join(filter(None, (record.tf, record.label, edit_of(record))))
+def label(record: Record[Any], has_one: bool) -> str:
+    """Return a label of a job: basic TF, fit, unless the report has one, and edit, if any."""
+    return " ".join(filter(None, (record.tf, "" if has_one else record.label, edit_of(record))))
 
 
 def edit_of(record: Record[Any]) -> str:
-    """Return the edit of a job that made a scene or its page, if any."""
+    """Return the edit of a job that made a scene or its page, or that it is as fitted; "" for other jobs."""
     edit = record.result.edit if isinstance(record.result, EditResult | PageResult) else ""
-    return "" if edit == NO_METHOD else edit
+    return AS_FITTED if edit == NO_METHOD else edit
 
 
 def data_uri(picture: Image.Image) -> str:

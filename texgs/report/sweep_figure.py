@@ -132,12 +132,11 @@ def scene_pictures(runs: DataFrame) -> dict[str, dict[str, np.ndarray]]:
 
 def picture(path: Path) -> np.ndarray:
     """Render a scene from the front."""
-    from texgs.report.before_after import POLAR
+    from texgs.core.lens import SIGHTS
     from texgs.scene.film import frames_of
     from texgs.scene.scene_file import read_scene
     from texgs.scene.shot import Shot
-    from texgs.volume.cameras import FRONT
 
-    scene = read_scene(path)
-    camera = Shot(azimuth=FRONT, polar=POLAR, width=PICTURE_SIZE).camera(scene.framed())
+    scene, (azimuth, polar) = read_scene(path), SIGHTS["front"]
+    camera = Shot(azimuth=azimuth, polar=polar, width=PICTURE_SIZE).camera(scene.framed())
     return next(frames_of(scene, [(camera, scene)], "cpu"))

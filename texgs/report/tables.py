@@ -8,10 +8,17 @@ from typing import Any
 from texgs.report.edit_tables import image_driven, looks, text_driven, text_driven_frozen
 from texgs.report.fit_tables import VARIANTS, ablation, fits, fitting, meshes, model_size
 from texgs.report.metrics_files import LeftOut, Record, note
+from texgs.report.published import are_of_paper
 from texgs.report.results import EditResult, FitResult
 from texgs.report.scene_tables import datasets, edits, rendering, steps
 from texgs.report.sweep_table import sweep
-from texgs.report.table import PAPER, Table, tables_file
+from texgs.report.table import PAPER, UNLIKE_CELL, Table, tables_file
+
+COMPARED_FACTS = (
+    "Numbers of the paper stand beside ours where recipe, size of images and number of training views are "
+    f"the paper's; elsewhere there is {UNLIKE_CELL}, not like for like. Its transfer functions are not "
+    "published: even there scenes differ, so that PSNR, SSIM and primitives are not like for like."
+)
 
 
 @dataclass(frozen=True)
@@ -25,22 +32,23 @@ class TableSpec:
     make: Callable[[Sequence[Record[Any]]], Table] | None  # None: supplied by the caller
     caption: str = ""
     number: str = ""  # in the paper, with A in its appendix; "" for other tables
-    paper: str = ""  # further content of the paper's table
-
-    @property
-    def heading(self) -> str:
-        """Return number and title."""
-        return f"Table {self.number}. {self.title}" if self.number else self.title
+    paper: str = ""  # sentences on the paper's table
 
     def table(
         self, records: Sequence[Record[Any]], left_out: Sequence[LeftOut] = (), given: Table | None = None
     ) -> Table:
-        """Return the table of some jobs, or the given one; its caption says what it shows and lacks."""
+        """Return the table of some jobs, or the given one; its caption says what it shows and lacks.
+
+        Only beside data of the paper, title and caption say where the paper has the table.
+        """
         made = self.make(records) if self.make else given or Table("", [], [])
-        where = f"In the paper: {self.paper}." if self.paper else ""
+        heading, where = self.title, ""
+        if are_of_paper(records):
+            heading += f" (Table {self.number} of the paper)" if self.number else ""
+            where = self.paper or COMPARED_FACTS * any(each.title.endswith(PAPER) for each in made.columns)
         parts = (self.caption, where, made.caption, note(left_out, self.places))
         shown = [each for each in made.columns if not each.title.endswith(PAPER) or made.has(each.title)]
-        return replace(made, columns=shown, heading=self.heading, caption=" ".join(filter(None, parts)))
+        return replace(made, columns=shown, heading=heading, caption=" ".join(filter(None, parts)))
 
 
 MAKERS: dict[str, Callable[[Sequence[Record[Any]]], Table]] = {

@@ -17,15 +17,15 @@ import yaml
 
 from texgs.core.cuts import AXES, NO_CUTS, Box, Cuts, Plane, along
 from texgs.core.errors import ArgumentError, errors_at
-from texgs.core.keys import typed_argument
-from texgs.core.light import HIDING
+from texgs.core.keys import require_keys, typed_argument
 from texgs.core.markers import Marker
 from texgs.core.names import is_number
 from texgs.core.plain_yaml import parse_yaml
+from texgs.fields.part_edit import LOOKS, require_part_key
 from texgs.scene.bounds import models_of, span_of
-from texgs.scene.parts import entry_of, key_path
+from texgs.scene.parts import entry_of
 from texgs.scene.scene import Scene
-from texgs.scene.scene_file import SEGMENT_KEYS, cuts_of, plain_cuts, require_keys
+from texgs.scene.scene_file import cuts_of, plain_cuts
 from texgs.scene.session import SCENE_KEYS, Session
 from texgs.volume.space import Space
 
@@ -36,8 +36,8 @@ PLANE = (
 )
 DIRECTIONS = "RASLPIXYZ"  # axes of the space of a volume's file
 BOX = "X0,Y0,Z0,X1,Y1,Z1, in world units"
-LOOKS = ("style", "picture", "instruction")  # keys of looks, which are not changes of numbers
 PLACES = {"marker": "TEXT@X,Y,Z", "distance": "X,Y,Z:X,Y,Z or TEXT@X,Y,Z:X,Y,Z"}  # words of new markers
+TABLES = ("cuts", "functions", "markers")  # whole, as scene files have them
 VOXEL_SUFFIX = "v"  # after a position in samples, counted from 0
 
 
@@ -66,6 +66,7 @@ def _apply(session: Session, word: str) -> None:
     name, is_edit, text = word.partition("=")
     if not is_edit:
         raise ArgumentError("expected KEY=VALUE, such as TF01.opacity=0.5")
+    require_part_key(word)
     part, dot, key = name.rpartition(".")
     if part in session.scene.models or (dot and "/" in part and "/" not in key):
         _change_part(session, part, key, text)
@@ -82,7 +83,10 @@ def _apply(session: Session, word: str) -> None:
         models = ", ".join(session.scene.models)
         raise ArgumentError(f"expected a model of the scene ({models}), got {part}")
     else:
-        require_keys({name: text}, ("light", *HIDING, "background", "cut", *PLACES, "time"), "the scene")
+        tables = () if not text or text[0] in "[{" else TABLES
+        require_keys(
+            {name: text}, [each for each in (*SCENE_KEYS, "cut", *PLACES) if each not in tables], "the scene"
+        )
         session.set_of_scene(name, _plain(text) if text else SCENE_KEYS[name])
 
 
@@ -129,7 +133,6 @@ def _change_part(session: Session, part: str, key: str, text: str) -> None:
             "a look by a picture or by words is learned: by texgs view, scene.style in Python, or an edit of "
             "texgs run (docs/looks.md)"
         )
-    require_keys({key: text}, SEGMENT_KEYS, key_path(part))
     if key in ("file", "texture"):
         session.set_file(part, key, _file(text) if text or key == "file" else None)
     elif text:
@@ -150,9 +153,9 @@ def _plain(text: str) -> Any:
     if text.startswith("#"):
         return text
     try:
-        return parse_yaml(f"[{text}]" if "," in text and not text.startswith("[") else text)
+        return parse_yaml(f"[{text}]" if "," in text and text[0] not in "[{" else text)
     except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise ArgumentError("expected a number, true, false, r,g,b or #rrggbb") from error
+        raise ArgumentError("expected a number, true, false, r,g,b, #rrggbb or a colour's name") from error
 
 
 def changed_cuts(scene: Scene, key: str, text: str) -> Cuts:

@@ -1,5 +1,6 @@
 """Files of a scene or a model for other programs: splats, points or a mesh; or a compact model file."""
 
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -181,7 +182,7 @@ def _write_fused(
 
 
 def _write_points(path: Path, model: Surfels, keys: Export, known: Space | None) -> Path:
-    """Write a PLY point cloud: means of opaque surfels, and the colours of their constant harmonic, uint8."""
+    """Write a PLY point cloud: means of surfels, and the colours of their constant harmonic, uint8."""
     means, _, _, opacities = geometry(model.parameters)
     opaque = opacities >= keys.opacity
     if not bool(opaque.any()):
@@ -189,6 +190,11 @@ def _write_points(path: Path, model: Surfels, keys: Export, known: Space | None)
         raise ArgumentError(
             f"{path}: expected surfels with an opacity of {keys.opacity:g} at least, got {most:.3g} "
             "at most; lower the limit"
+        )
+    if not bool(opaque.all()):
+        sys.stderr.write(
+            f"{path}: {int(opaque.sum()):,} of {len(opaque):,} surfels, those with an opacity of "
+            f"{keys.opacity:g} at least; --opacity 0 takes all\n"
         )
     color = (0.5 + Y00 * model.parameters["sh"][:, 0])[opaque]
     places, space = means[opaque], target_of(keys, known)

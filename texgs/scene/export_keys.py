@@ -51,7 +51,7 @@ class Export:
     steps: str = key(
         "all", "html: steps of a series that the page holds: all, one, the scene's, or a number N, each N-th"
     )
-    opacity: float = key(0.5, "points: leave out surfels with less opacity")
+    opacity: float = key(0.0, "points: leave out surfels with less opacity; default none, as many are faint")
     voxel: float = key(1 / 256, "edge of a cell of a mesh", "world units", above=0)
     views: int = key(92, "number of views that a mesh is made from", least=1)
     size: int = key(512, "of these views", "pixels", least=1)

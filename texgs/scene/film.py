@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import repeat
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
@@ -44,16 +44,23 @@ class Film(Shot):
     )
     seconds: float | None = key(None, "length of a film, in place of a number of frames", above=0)
     fps: float = key(25.0, "frames per second", above=0)
+    keys: Any = key(None, "file of keyframes, or a list in Python, in place of a movement", option="film")
 
     def __post_init__(self) -> None:
-        if self.frames is not None and self.seconds is not None:
-            raise ArgumentError("frames: expected a number of frames or of seconds, got both")
+        if self.keys is not None:
+            from texgs.scene.keyframes import read_keys
+
+            object.__setattr__(self, "keys", read_keys(self.keys, self, self.fps))
+        if sum(each is not None for each in (self.frames, self.seconds, self.keys)) > 1:
+            raise ArgumentError("frames: expected a number of frames or of seconds, or keys, got several")
         if self.count > MAX_FRAMES:
             raise ArgumentError(f"seconds: expected at most {MAX_FRAMES} frames, got {self.count}")
 
     @property
     def count(self) -> int:
         """Return the number of frames."""
+        if self.keys is not None:
+            return self.keys[-1].at + 1
         if self.seconds is not None:
             return max(1, round(self.seconds * self.fps))
         return COUNTS[self.what] if self.frames is None else self.frames
@@ -72,15 +79,21 @@ class Film(Shot):
             ArgumentError: if a cut or time is to move, and the scene has none.
         """
         from texgs.core.camera import orbit
+        from texgs.scene.keyframes import keyed_shots
         from texgs.volume.cameras import orbit_path, spiral
 
-        lens, count = lens or self.lens(scene.framed(composition)), self.count
+        framed = scene.framed(composition)
+        if self.keys is not None:
+            keyed = keyed_shots(self.keys, scene, composition or scene.open())
+            return ((shot.camera(framed), shown) for shot, shown in keyed)
+        lens, count = lens or self.lens(framed), self.count
         if self.what == "test":
             return ((camera, scene) for camera in spiral(count, lens, "frames"))
-        turn = orbit_path(count, self.polar, lens, self.azimuth)
+        azimuth = scene.framed(composition).azimuth if self.azimuth is None else self.azimuth
+        turn = orbit_path(count, self.polar, lens, azimuth)
         if self.what == "orbit":
             return ((place, scene) for place in turn)
-        camera = orbit(self.azimuth, self.polar, *lens)
+        camera = orbit(azimuth, self.polar, *lens)
         if self.what == "view":
             return repeat((camera, scene), count)
         shares = (i / max(count - 1, 1) for i in range(count))
@@ -92,7 +105,7 @@ class Film(Shot):
             low, high = sweep_range(scene, composition or scene.open())
             return ((camera, move_planes(scene, high + share * (low - high))) for share in shares)
         # from below the object to above, on the camera's side
-        lights = (scene.light.turned(self.azimuth, -90 + 180 * share) for share in shares)
+        lights = (scene.light.turned(azimuth, -90 + 180 * share) for share in shares)
         return ((camera, replace(scene, light=light)) for light in lights)
 
     def write(

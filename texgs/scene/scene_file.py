@@ -1,24 +1,25 @@
 """scene.yaml: basic models and their edits; opening composes them and trains nothing."""
 
 import os
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from texgs.core.colors import color
 from texgs.core.cuts import NO_CUTS, Cuts
 from texgs.core.errors import ArgumentError, errors_at
 from texgs.core.io import reading, write_bytes
-from texgs.core.keys import typed_argument
+from texgs.core.keys import require_keys, typed_argument
 from texgs.core.lens import Frame
 from texgs.core.light import HEADLIGHT, HIDING, Light
 from texgs.core.markers import Marker, Markers
-from texgs.core.names import SCENE, SCENES, close, is_number, label, named_file, require_name
+from texgs.core.names import METRICS, SCENE, SCENES, is_number, label, named_file, require_name, require_scene
 from texgs.core.plain_yaml import parse_yaml
 from texgs.fields.files import formats
-from texgs.fields.part_edit import PartEdit, color
+from texgs.fields.part_edit import EDIT_KEYS, SEGMENT_KEYS, PartEdit
 from texgs.scene.scene import WHITE, Scene, SceneModel, SceneSegment, SceneVolume
 from texgs.scene.series_file import read_series
 from texgs.volume.render import Appearance
@@ -26,12 +27,11 @@ from texgs.volume.space import Space
 from texgs.volume.transfer import TransferFunction
 
 VERSION = 1
+EDITS = "edits"  # folder of edits, beside that of the composed scene
 MAX_BYTES = 1 << 20  # a scene of a hundred models has a few thousand
 SCENE_KEYS = ("light", "background", "cuts", "frame")
 MAX_LISTED = 5  # scene files of a folder, in an error
 KEYS = ("texgs-scene", *SCENE_KEYS, "models", "volume", "space", "functions", "markers", "series", "time")
-EDIT_KEYS = tuple(each.name for each in fields(PartEdit))
-SEGMENT_KEYS = ("file", "texture", *EDIT_KEYS)
 MODEL_KEYS = (*SEGMENT_KEYS, "segments")
 LIGHT_KEYS = tuple(each.name for each in fields(Light))
 APPEARANCE_KEYS = tuple(each.name for each in fields(Appearance))
@@ -55,13 +55,19 @@ def read_scene(path: str | Path) -> Scene:
         return _scene(parse_yaml(path.read_text(encoding="utf-8")), path.parent)
 
 
+def title_of(path: Path) -> str:
+    """Return the name of a scene for people: data set, fit and edit of a job's, else that of its file."""
+    folders = path.resolve().parent.parts
+    if (path.parent / METRICS).exists():
+        names = folders[-5 if folders[-2] == EDITS else -4 :]
+        return " ".join(name for name in names if name not in ("scene", EDITS, "compose", "texture"))
+    return folders[-1] if path.name == SCENE else path.stem
+
+
 def scene_path(path: str | Path) -> Path:
     """Return the file of an argument of `read_scene`: for a folder, the scene file in it or below."""
     path = Path(path)
-    if not path.exists():
-        raise ArgumentError(
-            f"{path}: no such scene, folder or model; check its name, or let texgs compose write a scene"
-        )
+    require_scene(path)
     if not path.is_dir():
         if path.suffix not in SCENES and not formats(path):
             raise ArgumentError(
@@ -247,13 +253,3 @@ def plain_cuts(cuts: Cuts) -> dict[str, Any]:
 def markers_of(value: Any) -> tuple[Marker, ...]:
     """Return the markers that a value of a scene file stands for, a list of tables."""
     return typed_argument(Markers, {"markers": value}).markers
-
-
-def require_keys(values: Any, keys: Collection[str] | None, where: str) -> None:
-    """Require a table with known keys; the error for an unknown key names the most similar one."""
-    if not isinstance(values, dict):
-        raise ArgumentError(f"{where}: expected a table of keys and values, got {values!r}")
-    for key in values if keys is not None else ():
-        if key not in keys:  # type: ignore[operator]
-            hint = close(key, keys or ()) or f"; expected {', '.join(keys or ())}"
-            raise ArgumentError(f"{where}: no such key {key!r}{hint}")

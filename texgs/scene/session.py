@@ -15,13 +15,15 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
+from texgs.core.colors import color
 from texgs.core.cuts import Cuts
 from texgs.core.errors import ArgumentError, errors_at
+from texgs.core.keys import require_keys
 from texgs.core.light import HEADLIGHT, HIDING, Light
 from texgs.core.names import require_name
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
-from texgs.fields.part_edit import PartEdit, color, require_possible
+from texgs.fields.part_edit import EDIT_KEYS, PartEdit, require_possible
 from texgs.raster import Render
 from texgs.scene.cut_view import scene_and_volume
 from texgs.scene.exposure import require_shadows
@@ -30,16 +32,7 @@ from texgs.scene.legend import legend_of
 from texgs.scene.marks import with_marks
 from texgs.scene.parts import NewLook, entry_of, key_path, replace_entry, require_new, split, with_looks
 from texgs.scene.scene import WHITE, Scene, SceneSegment
-from texgs.scene.scene_file import (
-    EDIT_KEYS,
-    cuts_of,
-    functions_of,
-    light_of,
-    markers_of,
-    read_scene,
-    require_keys,
-    write_scene,
-)
+from texgs.scene.scene_file import cuts_of, functions_of, light_of, markers_of, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.scene.shot import Mode, Shot
 from texgs.scene.twin import Twin, last_of, needs_twin
@@ -323,9 +316,7 @@ class Session:
         """
         scene = self.scene if scene is None else scene
         composition = self.composition_of(scene)
-        twin = self.twin_of(scene) if needs_twin(scene, mode) else None
-        if twin is not None and step is not None:
-            twin = twin.with_step(step, by_cell=False)  # of something that moves, perhaps its function
+        twin = self.twin_of(scene, step) if needs_twin(scene, mode) else None
         return frame(composition, camera, scene, mode, twin, transparent=transparent)
 
     def picture(self, camera: Camera, shot: Shot, scene: Scene | None = None) -> np.ndarray:
@@ -347,14 +338,16 @@ class Session:
         twin = self.twin_of(self.scene)
         return slice_picture(twin.grid, keys, twin.labels(self.scene, self.composition.palettes))
 
-    def twin_of(self, scene: Scene) -> Twin:
-        """Return the twin of a scene of the history; the latest twins are cached."""
+    def twin_of(self, scene: Scene, step: float | None = None) -> Twin:
+        """Return the twin of a scene of the history; the latest twins are cached. For `step` see `frame`."""
         state = (scene.volume, state_of(scene.volume.file if scene.volume else None))
-        return last_of(self._twins, state, lambda: Twin(scene, self._device))
+        twin = last_of(self._twins, state, lambda: Twin(scene, self._device))
+        # With a step, something moves, perhaps a function.
+        return twin if step is None else twin.with_step(step, by_cell=False)
 
-    def beside(self, camera: Camera, scene: Scene) -> tuple[Render, Render]:
+    def beside(self, camera: Camera, scene: Scene, step: float | None = None) -> tuple[Render, Render]:
         """Render a scene of the history and the same view of its volume; see `scene_and_volume`."""
-        return scene_and_volume(self.composition_of(scene), camera, scene, self.twin_of(scene))
+        return scene_and_volume(self.composition_of(scene), camera, scene, self.twin_of(scene, step))
 
     def save(self, path: str | Path) -> Path:
         """Write the scene file in one step; files in it are relative to its folder."""

@@ -31,7 +31,12 @@ Mode = Literal[
 class Shot(LensKeys):
     """Viewpoint and mode of a picture."""
 
-    azimuth: float = key(30.0, "of the camera, not on path test; on an orbit of the first frame", "degrees")
+    azimuth: float | None = key(
+        None,
+        "of the camera, not on path test; on an orbit of the first frame; default the scene's, 30 where it "
+        "says no other",
+        "degrees",
+    )
     polar: float = key(20.0, "of the camera above the horizon, not on path test", "degrees")
     mode: Mode = key("shaded", "what a picture shows; the last four are factors of the material")
     transparent: bool = key(False, "leave the background out: pictures have an alpha channel")
@@ -41,4 +46,5 @@ class Shot(LensKeys):
         """Return the camera; by default it shows the whole frame."""
         from texgs.core.camera import orbit
 
-        return orbit(self.azimuth, self.polar, *self.lens(framed))
+        azimuth = framed.azimuth if self.azimuth is None else self.azimuth
+        return orbit(azimuth, self.polar, *self.lens(framed))

@@ -17,10 +17,10 @@ import numpy as np
 import torch
 
 from texgs.core.image import open_picture
+from texgs.core.lens import FRONT
 from texgs.scene.film import Film, frames_of
 from texgs.scene.scene import WHITE, Scene
 from texgs.study.questions import Question, rank_name
-from texgs.volume.cameras import FRONT
 
 POLAR = 20.0  # degrees above the horizon
 CRF = 23  # of H.264; half the bytes of other films, so that the page can be mailed

@@ -16,14 +16,13 @@ from texgs.fields.surfels.composition import Composition
 from texgs.raster.shading import MATERIAL
 from texgs.scene.bounds import STRAY_SHARE, models_of, span_of
 from texgs.scene.legend import legend_of
-from texgs.scene.scene import Scene
+from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import plain_functions
-from texgs.scene.shot import Mode
+from texgs.scene.shot import Mode, Shot
 from texgs.volume.grid import closest
 from texgs.volume.space import LETTERS, Space
 
 LENS = Lens()
-HOME = {"azimuth": 30.0, "polar": 20.0}  # degrees, as `texgs render` has them
 # What a kind of field has to be capable of for a mode of frames; all others are for each.
 MODES = {"unshaded": "unlit", "normal": "normals", "texture": "texture", "discs": "texture"}
 MODES |= dict.fromkeys(MATERIAL, "relight")
@@ -56,7 +55,7 @@ def bounds(scene: Scene, composed: Composed) -> dict[str, Any]:
     The box is that of the scene's volume, else that of the models: these have no physical units.
     """
     framed = scene.framed(composed)
-    ball = {"center": list(framed.target), "radius": framed.radius}
+    ball = {"center": list(framed.target), "radius": framed.radius, "azimuth": framed.azimuth}
     with suppress(TexgsError):  # the error is told to whoever shows the volume
         if scene.volume is not None:
             grid = scene.volume.open()
@@ -79,12 +78,13 @@ def describe(
         # Only what has a palette has a texture, which can get a new look.
         is_textured = part is not None and part.palette is not None
         can = [*keys, "look"] if is_textured else [key for key in keys if key != "palette"]
-        own = [{"name": key, "edit": asdict(segment.edit)} for key, segment in entry.segments.items()]
-        said = {"name": model, "kind": kind.name, "edit": asdict(entry.edit), "fitted_palette": list(palette)}
+        own = [_part(key, segment) for key, segment in entry.segments.items()]
+        said = {**_part(model, entry), "kind": kind.name, "fitted_palette": list(palette)}
         models.append({**said, "can": [*can, *segments], "segments": own})
     known = known or bounds(scene, composed)
     light, target = scene.light, known["center"]
     distance = Frame(target, known["radius"]).lens(LENS.fov_y).radius
+    angles = {"azimuth": known["azimuth"], "polar": Shot.polar}  # as `texgs render` has them
     return {
         "name": name,
         "background": list(scene.background),
@@ -103,8 +103,13 @@ def describe(
         "bounds": known,
         "space": drawn(scene.space) if scene.space else None,
         "fov_y": LENS.fov_y,
-        "views": [{"name": "home", "target": target, "distance": distance, **HOME}],
+        "views": [{"name": "home", "target": target, "distance": distance, **angles}],
     }
+
+
+def _part(name: str, entry: SceneModel | SceneSegment) -> dict[str, Any]:
+    """Return what a page needs of a model or a segment alone."""
+    return {"name": name, "edit": asdict(entry.edit), "styled": entry.texture is not None}
 
 
 def drawn(space: Space) -> dict[str, Any]:

@@ -2,17 +2,20 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from math import exp, log
 from pathlib import Path
 
 import numpy as np
 
 from texgs.core.errors import ArgumentError
+from texgs.core.keys import require_keys
 from texgs.core.names import EXPORTS
 from texgs.fields.files import kind_of
+from texgs.fields.part_edit import EDIT_KEYS
 from texgs.scene import export_keys
 from texgs.scene.film import Film
+from texgs.scene.keyframes import KEPT, keyed_shots
 from texgs.scene.scene import Scene
+from texgs.scene.session import SCENE_KEYS
 from texgs.viewer import PAGE_VOLUME
 from texgs.viewer.export import export
 from texgs.viewer.messages import Export, Orbit, View
@@ -25,6 +28,7 @@ def write_download(
     scene: Scene,
     asked: Export,
     name: str,
+    title: str,
     checked: str,
     pixels: Callable[[View, Scene], np.ndarray],
 ) -> tuple[Path, list[str]]:
@@ -35,6 +39,7 @@ def write_download(
         scene: to write.
         asked: what, and how.
         name: of the file, without its ending.
+        title: of a page.
         checked: what `texgs check` has found of the scene.
         pixels: draws a view of a scene, for films.
     """
@@ -43,33 +48,16 @@ def write_download(
     ending = EXPORTS.get(kind, [f".{kind}"])[0]
     path = folder / (f"{name}-{kind}{ending}" if ending == ".ply" else f"{name}{ending}")  # kinds share .ply
     if kind in FILMS:
-        view = replace(asked.view, transparent=False)
-        frames = (pixels(replace(view, camera=each), scene) for each in way_of(asked))
-        return film_of(asked).write(path, frames, checked, title="film"), []
+        for name in {name for key in asked.keys for name in key}:  # no page opens files of its choice
+            require_keys({name.rpartition(".")[2]: None}, (*KEPT, *SCENE_KEYS, *EDIT_KEYS), "keys")
+        view, film = replace(asked.view, transparent=False), Film(keys=[*asked.keys], fps=asked.fps)
+        size = view.camera.width, view.camera.height
+        keyed = keyed_shots(film.keys, scene, scene.open())
+        seen = ((Orbit(x.target, x.azimuth, x.polar, x.radius, x.fov_y, *size), shown) for x, shown in keyed)
+        frames = (pixels(replace(view, camera=camera), shown) for camera, shown in seen)
+        return film.write(path, frames, checked, title="film"), []
     keys = export_keys.Export(kind, volume=volume, steps=asked.steps if kind == "html" else "all")
-    return path, export(path, scene, keys, checked, name)
-
-
-def film_of(asked: Export) -> Film:
-    """Return how long a film is."""
-    return Film(seconds=asked.seconds, fps=asked.fps)
-
-
-def way_of(asked: Export) -> list[Orbit]:
-    """Return the cameras of a film: one turn from its view on, or a smooth way through its stops."""
-    from scipy.interpolate import PchipInterpolator
-
-    start, count = asked.view.camera, film_of(asked).count
-    if len(asked.stops) < 2:
-        return [replace(start, azimuth=start.azimuth + 360 * index / count) for index in range(count)]
-    stops = np.array([[s.azimuth, s.polar, log(s.distance), s.fov_y, *s.target] for s in asked.stops])
-    stops[:, 0] = np.unwrap(stops[:, 0], period=360)
-    way = PchipInterpolator(range(len(stops)), stops)  # it stays between two stops: no pole is passed
-    places = way(np.linspace(0, len(stops) - 1, count)).round(9).tolist()
-    return [
-        Orbit(tuple(target), azimuth, polar, exp(distance), fov_y, start.width, start.height)
-        for azimuth, polar, distance, fov_y, *target in places
-    ]
+    return path, export(path, scene, keys, checked, title)
 
 
 def exports_of(scene: Scene) -> list[str]:

@@ -10,8 +10,8 @@ import struct
 import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from ctypes import c_int32
 from dataclasses import dataclass, replace
-from functools import partial
 from math import sqrt
 
 import cv2
@@ -23,6 +23,7 @@ from texgs.core.cuts import NO_CUTS
 from texgs.core.errors import ArgumentError
 from texgs.core.movie import save_png
 from texgs.metrics.quality import compare
+from texgs.raster.native import stopped_by
 from texgs.report.beside_volume import scale_of
 from texgs.report.fit_figure import signed_error
 from texgs.scene.frame import quantize
@@ -32,9 +33,11 @@ from texgs.scene.shot import Shot
 from texgs.viewer.messages import View
 from texgs.viewer.origins import Origins, fitted, over
 
-SLOW_FRAME = 0.025  # seconds; slower frames of a moving camera have fewer rows and columns
-LEAST_SCALE = 1 / 3  # of rows and columns
-MOVING_STEPS = {"volume": 0.5}  # voxels between samples of a volume while something moves, by mode
+SLOW_FRAME = 0.025  # seconds; slower frames of what moves have fewer rows and columns
+LEAST_SCALE = 1 / 3  # of rows and columns, unless frames still take longer than `SLOWEST_FRAME`
+SLOWEST_FRAME = 0.06  # seconds; what is off by less than a fifth still leaves ten frames a second
+LEAST_ROWS = 120  # however slow frames are
+MOVING_STEPS = dict.fromkeys(("volume", "difference", "wipe"), 0.5)  # voxels between samples, while moving
 MOVING_CUT_STEP = 1.0  # the same of faces of cuts
 MOVING_JPEG = (75, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420)
 ENLARGED_PIXELS = 300 * 300  # at most, of a picture that a page enlarges: it is cheap to send in good quality
@@ -44,7 +47,7 @@ STILL_JPEG = (95, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
 
 @dataclass
 class Pace:
-    """How long frames of one page take; it decides on the resolution while its camera moves."""
+    """How long frames of a page take in one mode; it decides on their resolution while something moves."""
 
     part: float = 1.0  # of the sides of a frame
 
@@ -52,14 +55,21 @@ class Pace:
         """Return the part of the sides of a frame to render."""
         return self.part if moving else 1.0
 
-    def took(self, seconds: float, scale: float) -> None:
-        """Learn from a frame. A whole one counts while moving ones are whole as well.
+    def took(self, seconds: float, scale: float, rows: int) -> None:
+        """Learn from a frame that has so many rows when it is whole.
 
-        What is off by less than a fifth changes nothing, so that the sharpness of a drag does not waver.
+        A whole one counts while moving ones are whole as well. What is off by less than a fifth changes
+        nothing, so that the sharpness of a drag does not waver.
         """
-        part = min(max(scale * sqrt(SLOW_FRAME / seconds), LEAST_SCALE), 1.0)
+        fast, slow = (scale * sqrt(each / seconds) for each in (SLOW_FRAME, SLOWEST_FRAME))
+        part = min(max(fast, min(slow, LEAST_SCALE), least_scale(rows)), 1.0)
         if scale == self.part and (part == 1 or not 0.8 < part / scale < 1.25):
             self.part = part
+
+
+def least_scale(rows: int) -> float:
+    """Return the least part of the sides of a frame, which whole has so many rows."""
+    return min(LEAST_SCALE, LEAST_ROWS / rows)
 
 
 class Frames:
@@ -70,14 +80,20 @@ class Frames:
         threads = torch.get_num_threads()
         self._thread = ThreadPoolExecutor(1, "render", torch.set_num_threads, (threads,))
 
-    async def frame(self, view: View, scene: Scene, pace: Pace) -> bytes:
-        """Return a header and a JPEG picture, see `packed`."""
+    async def frame(self, view: View, scene: Scene, paces: dict[str, Pace], stop: c_int32) -> bytes:
+        """Return a header and a JPEG picture, see `packed`; it takes the pace of its mode, and learns it.
+
+        Another thread may set `stop` meanwhile: then it raises Stopped, unless the frame is as good as done.
+        """
 
         def work() -> bytes:
-            scale, start = pace.scale(view.moving), time.perf_counter()
-            pixels, scores = self._draw(view, scene, scale)
+            rows, start = view.camera.height, time.perf_counter()
+            pace = paces.setdefault(view.mode, Pace(least_scale(rows) if view.mode in MOVING_STEPS else 1.0))
+            scale = pace.scale(view.moving)
+            with stopped_by(stop):
+                pixels, scores = self._draw(view, scene, scale)
             seconds = time.perf_counter() - start
-            pace.took(seconds, scale)
+            pace.took(seconds, scale, rows)
             return packed(view, pixels, seconds, scores)
 
         return await asyncio.get_running_loop().run_in_executor(self._thread, work)
@@ -94,8 +110,8 @@ class Frames:
 
     async def point_at(self, view: View, scene: Scene, pixel: tuple[int, int]) -> list[float] | None:
         """Return the point of the scene that a pixel of a view shows; None for the background."""
-        work = partial(self._session.point_at, view.camera.camera(), view.mode, scene, pixel)
-        return await asyncio.get_running_loop().run_in_executor(self._thread, work)
+        camera = view.camera.camera()
+        return await asyncio.to_thread(self._session.point_at, camera, view.mode, scene, pixel)
 
     def pixels(self, view: View, scene: Scene) -> np.ndarray:
         """Return what a view shows [H, W, 3 or 4], uint8, and the scene's markers on it: for files."""
@@ -110,9 +126,9 @@ class Frames:
 
     def _draw(self, view: View, scene: Scene, scale: float) -> tuple[np.ndarray, dict[str, float]]:
         """Return what a view shows, with scaled sides, and its scores."""
-        if view.mode == "truth" or view.mode == "difference" or view.mode == "wipe":
-            return self._beside.frame(view, scene, scale)
         step = MOVING_STEPS.get(view.mode, MOVING_CUT_STEP) if view.moving else None
+        if view.mode == "truth" or view.mode == "difference" or view.mode == "wipe":
+            return self._beside.frame(view, scene, scale, step)
         camera, transparent = view.camera.camera(scale), view.transparent
         return self._session.frame(camera, view.mode, scene, step, transparent=transparent), {}
 
@@ -142,7 +158,9 @@ class Beside:
             return ["volume", "difference", "wipe"]
         return ["truth", "difference"] if self._origins.has_views else []
 
-    def frame(self, view: View, scene: Scene, scale: float) -> tuple[np.ndarray, dict[str, float]]:
+    def frame(
+        self, view: View, scene: Scene, scale: float, step: float | None = None
+    ) -> tuple[np.ndarray, dict[str, float]]:
         """Return a frame [H, W, 3], uint8, and at rest how close scene and volume are in it.
 
         Nothing is told of a cut scene that shows its volume itself.
@@ -151,7 +169,7 @@ class Beside:
         """
         camera = view.camera.camera(scale)
         if scene.volume is not None:
-            image, truth = self._session.beside(camera, scene)
+            image, truth = self._session.beside(camera, scene, step)
             says_nothing = view.moving or scene.shows_volume
             return comparison(view, image.color, truth.color), {} if says_nothing else compare(image, truth)
         if view.mode == "wipe":

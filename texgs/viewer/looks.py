@@ -75,7 +75,8 @@ class Looks:
         """
         task, on_their_way = self._task(session.scene, asked, output), self._new_folder()
         try:
-            return give_look(session, task, asked.style or asked.instruction, Throttled(show, on_their_way))
+            title = (asked.style or asked.instruction) + (f", hue {asked.hue:.3g}" if asked.hue < 1 else "")
+            return give_look(session, task, title, Throttled(show, on_their_way))
         finally:
             rmtree(on_their_way, ignore_errors=True)
 

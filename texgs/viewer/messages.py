@@ -163,9 +163,8 @@ class Export:
     """Write a file for the page to save."""
 
     kind: str  # of `exports_of`
-    view: View  # that a turntable begins with
-    stops: tuple[Orbit, ...] = key((), "of a film; of fewer than 2, a turntable", items=(0, 20))
-    seconds: float = key(2.88, "length of a film", "seconds", least=0.1, most=600)
+    view: View  # that is shown
+    keys: tuple[dict[str, Any], ...] = key((), "of a film, see `read_keys`", items=(0, 20))
     fps: float = key(25.0, "of a film", "frames per second", least=1, most=240)
     steps: str = "all"  # of a series, in a page; see `page_steps`
 

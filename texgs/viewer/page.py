@@ -5,11 +5,12 @@ import json
 import logging
 from collections import deque
 from collections.abc import Awaitable, Callable, Mapping
+from ctypes import c_int32
 from typing import Any
 
 from aiohttp import web
 
-from texgs.core.errors import TexgsError, first_line
+from texgs.core.errors import Stopped, TexgsError, first_line
 from texgs.scene.parts import NewLook
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames, Pace
@@ -20,10 +21,6 @@ log = logging.getLogger("texgs.viewer")
 MOST_NOTICES = 8  # may wait for a page that does not listen
 BEAT = 5.0  # seconds; a page takes its connection for broken after a few silent ones
 Find = Callable[[Mask | Look], Awaitable[Any]]  # what clicks select as a message, or a `TriedLook`
-
-
-class Stopped(TexgsError):
-    """The user has cancelled the work."""
 
 
 class Page:
@@ -42,13 +39,14 @@ class Page:
         self._tried: Look | None = None  # the newest preview, until it is taken off
         self._trial: dict[str, NewLook] = {}
         self._shown_looks = deque[Any](maxlen=2)  # keeps their files, for frames on their way
-        self._pace = Pace()
+        self._paces: dict[str, Pace] = {}  # by mode
+        self._stop = c_int32()  # stops the whole frame that is being rendered
         self.answered = 0  # count of messages that change the scene
         self._wake = asyncio.Event()
 
     def show(self, view: View) -> None:
-        """Send a frame of this view, in place of one that waits."""
-        self._view = view
+        """Send a frame of this view, in place of one that waits and of a whole one that is being rendered."""
+        self._view, self._stop.value = view, 1
         self._wake.set()
 
     async def pick(self, asked: Pick) -> None:
@@ -99,6 +97,7 @@ class Page:
                 self._wake.clear()
                 await self._send_what_waits()
         finally:
+            self._stop.value = 1
             for task in self._finding.values():
                 task.cancel()
 
@@ -133,9 +132,14 @@ class Page:
         self._wake.set()
 
     async def _send_frame(self, view: View) -> None:
-        """Render a view and send it."""
+        """Render a view and send it; a whole one is given up when a newer view comes meanwhile."""
+        stop = c_int32()
+        if not view.moving:
+            self._stop = stop
         try:
-            frame = await self._frames.frame(view, self.scene_of(view), self._pace)
+            frame = await self._frames.frame(view, self.scene_of(view), self._paces, stop)
+        except Stopped:
+            return
         except Exception as error:  # the server survives it
             self.tell_error(error, frame=view.id)
             return

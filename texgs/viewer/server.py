@@ -14,6 +14,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import HIDING
 from texgs.models.instruction import WORDS
 from texgs.scene.scene import Scene
+from texgs.scene.scene_file import title_of
 from texgs.scene.session import Session
 from texgs.viewer.description import bounds, describe, presets
 from texgs.viewer.downloads import exports_of
@@ -22,7 +23,7 @@ from texgs.viewer.guard import guard, headers
 from texgs.viewer.messages import MESSAGE_BYTES, Cancel, Job, Look, Mask, Message, Pick, Save, View, parse
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
-from texgs.viewer.shared_edits import Opened, SharedEdits, title_of
+from texgs.viewer.shared_edits import Opened, SharedEdits
 from texgs.viewer.slices import Slices
 from texgs.viewer.styles import LARGEST_PICTURE
 from texgs.viewer.work import Work

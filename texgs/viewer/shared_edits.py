@@ -12,7 +12,7 @@ from texgs.report.check import found_sentence
 from texgs.scene.copied import require_files, write_copy
 from texgs.scene.parts import NewLook, part_names, with_looks
 from texgs.scene.scene import Scene
-from texgs.scene.scene_file import read_scene, scene_path, write_scene
+from texgs.scene.scene_file import read_scene, scene_path, title_of, write_scene
 from texgs.scene.session import Session, files_of, state_of
 from texgs.viewer.messages import Edit, Redo, Remove, Rename, Undo, View
 from texgs.viewer.segments import isolated
@@ -30,7 +30,7 @@ class Opened:
     folder: Path
     name: str  # of the scene file to save, by default
     file: Path | None = None  # the scene file that edits may replace
-    title: str = ""  # on pages; default the end of the path
+    title: str = ""  # on pages; default by the path
     copies: Path | None = None  # folder for copies of all files; default: save a scene file only
 
 
@@ -49,18 +49,13 @@ def open_scene(path: Path, folder: Path | None = None) -> Opened:
     return Opened(read_scene(path), path, folder, name, file)
 
 
-def title_of(path: Path) -> str:
-    """Return the end of a path, as a title."""
-    return Path(*path.resolve().parts[-4:]).as_posix()
-
-
 class SharedEdits:
     """The scene that all pages edit, and where it is saved."""
 
     def __init__(self, session: Session, opened: Opened) -> None:
         self.session, self._folder, self._copies = session, opened.folder, opened.copies
         self.name, self._source = opened.name, opened.source
-        self._title = opened.title or title_of(opened.source)
+        self.title = opened.title or title_of(opened.source)
         files = [opened.file.resolve()] if opened.file else []
         self._own = {file: state_of(file) for file in files}  # may be replaced unasked in this state
         self.original = self._saved = session.scene
@@ -102,7 +97,7 @@ class SharedEdits:
             "saved": self.is_saved,
             "file": self.name,
             "folder": str((self._copies or self._folder).resolve()),
-            "title": self._title,
+            "title": self.title,
         }
 
     def change(self, asked: Change, author: int) -> None:
@@ -156,7 +151,7 @@ class SharedEdits:
         path, scene = self.path_of(name), self.scene
         require_files(files_of(scene))
         path = write_copy(path.parent, scene) if self._copies else write_scene(path, scene)
-        self.name, self._title, self._saved = name, title_of(path), scene
+        self.name, self.title, self._saved = name, title_of(path), scene
         self._own[path.resolve()] = state_of(path.resolve())
         return path
 

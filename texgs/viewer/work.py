@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import torch
 
 from texgs.config.kept_function import keep
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, Stopped
 from texgs.core.progress import let_stop, watching
 from texgs.edit.function_model import FIRST_MODEL, fit_function, overlap_of
 from texgs.scene.parts import NewLook
@@ -24,7 +24,7 @@ from texgs.viewer.downloads import write_download
 from texgs.viewer.frames import Frames
 from texgs.viewer.looks import Looks
 from texgs.viewer.messages import Export, Fit, Job, Keep, Look, Mask, Segment
-from texgs.viewer.page import Page, Stopped
+from texgs.viewer.page import Page
 from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.styles import Styles
@@ -212,7 +212,8 @@ class Work:
         """Write a file of a scene, and return the notice about it."""
         edits = self._edits
         name, checked = Path(edits.name).stem, edits.checked(scene)
-        path, notes = write_download(self._downloads, scene, asked, name, checked, self._frames.pixels)
+        known = name, edits.title, checked
+        path, notes = write_download(self._downloads, scene, asked, *known, self._frames.pixels)
         let_stop(path.name)
         words = ", ".join([f"{path.stat().st_size / 2**20:.1f} MiB", *notes])
         return {"text": f"{path.name}: {words}", "name": path.name}

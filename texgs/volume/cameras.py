@@ -10,11 +10,10 @@ import torch
 
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
-from texgs.core.lens import Lens, frequency_of
+from texgs.core.lens import FRONT, SIGHTS, Lens, frequency_of
 
 POLE = 89.99  # degrees; the paper's views stop short of the poles, so that +y is up in every one of them
 T = TypeVar("T")
-FRONT = -90.0  # azimuth of +z, degrees
 
 
 def icosphere(frequency: int, lens: Lens) -> list[Camera]:
@@ -55,6 +54,11 @@ def orbit_path(count: int, polar: float, lens: Lens, start: float = FRONT) -> li
     """
     turn = [start + 360 * index / count for index in range(count)]
     return [orbit(azimuth, polar, *lens) for azimuth in turn]
+
+
+def sights(lens: Lens) -> dict[str, Camera]:
+    """Return the cameras of `SIGHTS` by name."""
+    return {name: orbit(azimuth, polar, *lens) for name, (azimuth, polar) in SIGHTS.items()}
 
 
 def spread(path: Sequence[T], count: int) -> list[T]:

@@ -1,6 +1,7 @@
 """The ball of a volume's visible part under transfer functions, the target of cameras."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import combinations, pairwise, product
 
 import numpy as np
@@ -18,10 +19,13 @@ SQUARE_SLACK = 1 + 1e-7  # times a squared radius: rounding, of points that near
 def frame_of(grid: Grid, tfs: Iterable[TransferFunction]) -> Frame:
     """Return the smallest ball around all cells that are visible under a basic transfer function.
 
+    A patient is seen first from the front.
+
     Raises:
         ArgumentError: if nothing is visible.
     """
-    return smallest_ball(shown_corners(grid, tfs))
+    ball, front = smallest_ball(shown_corners(grid, tfs)), grid.world.front
+    return ball if front is None else replace(ball, azimuth=front)
 
 
 def out_of_frame(grid: Grid, tf: TransferFunction, frame: Frame) -> str:

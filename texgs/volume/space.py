@@ -13,6 +13,7 @@ Triple = tuple[float, float, float]
 # Names are those of NRRD; the first is of files that tell no more.
 RIGHT_HANDED, LEFT_HANDED = "3D-right-handed", "3D-left-handed"
 LPS, RAS = "left-posterior-superior", "right-anterior-superior"
+OBLIQUE = 30.0  # degrees from the front, so that a side is seen, too
 LETTERS = {LPS: ("LPS", "RAI"), RAS: ("RAS", "LPI")}  # ahead and behind along the axes of a patient's space
 
 
@@ -81,6 +82,13 @@ class Space:
         ahead, behind = LETTERS.get(self.name, ("", ""))
         unit = np.eye(3)
         return dict(zip("XYZ" + ahead + behind, [*unit, *unit, *-unit], strict=False)).get(letter)
+
+    @property
+    def front(self) -> float | None:
+        """Azimuth of a camera obliquely in front of a patient, degrees; None without one who is upright."""
+        towards = self.axis("A")
+        x, _, z = np.zeros(3) if towards is None else self.turn.T @ towards
+        return float(np.degrees(np.arctan2(-z, x))) + OBLIQUE if np.hypot(x, z) > 0.5 else None
 
 
 UNKNOWN_SPACE = Space()

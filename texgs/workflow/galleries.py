@@ -10,14 +10,13 @@ from texgs.config.gallery import NO_EDIT, GalleryCell, GalleryRow, Grid, GridKey
 from texgs.config.project import members
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
+from texgs.core.lens import SIGHTS
 from texgs.core.names import close
 from texgs.edit.method import NO_METHOD, method_of
 from texgs.workflow.edits import chain_of
 from texgs.workflow.inputs import prepared_volume, sibling, with_recipe
 from texgs.workflow.stage import edit_folder, fit_folder, result_file
 from texgs.workflow.sweep import variant_words
-
-FRONT, SIDE, ABOVE = [-90.0, 20.0], [0.0, 20.0], [-130.0, 50.0]  # azimuth, polar angle of cameras, degrees
 
 
 def gallery_command(config: Config) -> str:
@@ -62,8 +61,7 @@ def all_looks(config: Config) -> GridKeys:
             titles = [name] if len(able) == 1 else [f"{name}, {recipe}" for recipe in able]
             columns += [ShotKeys(title, name, recipe) for title, recipe in zip(titles, able, strict=True)]
     words = "The volume, the scene of the first recipe as fitted, and all its new looks."
-    views = {"front": FRONT, "side": SIDE, "above": ABOVE}
-    rows = [ShotKeys(title, view=view) for title, view in views.items()]
+    rows = [ShotKeys(title, view=list(view)) for title, view in SIGHTS.items()]
     return GridKeys("gallery", words, rows, columns)
 
 
@@ -97,7 +95,7 @@ def combine_shots(row: ShotKeys, column: ShotKeys, has_volume: bool) -> ShotKeys
     if (row.show and column.show and row.show != column.show) or not (has_volume or show == "scene"):
         show = ""
     changes = [*row.changes, *column.changes]
-    edit, view = said["edit"] or NO_EDIT, said["view"] or FRONT
+    edit, view = said["edit"] or NO_EDIT, said["view"] or list(SIGHTS["front"])
     return ShotKeys(**{**said, "show": show, "edit": edit, "view": view, "changes": changes})
 
 

@@ -71,15 +71,14 @@ def environment_of(plan: Plan) -> dict[str, str]:
     return own
 
 
-def shell_prefix(environment: Mapping[str, str], client: str) -> str:
+def shell_prefix(environment: Mapping[str, str], client: str, *, is_shown: bool) -> str:
     """Return what stands in front of the commands of all rules: `texgs`, by a client of the fork server.
 
+    What jobs print goes to their logs, and where `is_shown` to the output of the run, too.
     A job goes on where nobody reads its output any more, and so does its log: `tee` would end with a signal,
     or where it is BSD's, at its end with an error.
     """
     setting = " ".join(f"{name}={shlex.quote(value)}" for name, value in environment.items())
     program = f"{setting} {shlex.quote(sys.executable)} -PSE {shlex.quote(client)}"
-    return (
-        "set -euo pipefail; trap '' PIPE; tee() {{ command tee \"$@\" || true; }}; "
-        f'texgs() {{{{ {program} "$@"; }}}}; '
-    )
+    tee = 'command tee "$@" || true' if is_shown else 'cat > "$1"'
+    return f"set -euo pipefail; trap '' PIPE; tee() {{{{ {tee}; }}}}; texgs() {{{{ {program} \"$@\"; }}}}; "

@@ -49,8 +49,8 @@ config["captions"] = {each.name: each.shown for each in RULES.values()}
 
 # In front of the commands, not a parameter of the rules: it changes no result.
 ENVIRONMENT = environment_of(PLAN)
-shell.prefix(shell_prefix(ENVIRONMENT, fork_client.__file__))
 RUN = WorkflowRun(workflow, PLAN, WORDS, partial(fork_server.start, ENVIRONMENT))
+shell.prefix(shell_prefix(ENVIRONMENT, fork_client.__file__, is_shown=not RUN.has_own_log))
 
 
 def any_of(names, otherwise="none"):

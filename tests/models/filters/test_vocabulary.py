@@ -7,7 +7,7 @@ import pytest
 from tests.refusals import refused
 from texgs.core.errors import ArgumentError
 from texgs.models.filters import FILTERS
-from texgs.models.instruction import WORDS, named_color, understand, vocabulary
+from texgs.models.instruction import WORDS, understand, vocabulary
 
 WORDINGS = {
     **{name: (f"make it {name}", f"make it of {name}.") for name in ("marble", "wood", "glass", "silver")},
@@ -57,10 +57,3 @@ def test_every_filter_has_words_and_is_understood_as_itself():
 @pytest.mark.parametrize("instruction", ["", "  ", "\n", None, 3])
 def test_empty_instructions(instruction):
     refused(lambda: understand(instruction), "what to do in words")
-
-
-def test_colours_by_name():
-    assert named_color("teal") == pytest.approx((0, 128 / 255, 128 / 255))
-    assert named_color("#ff8000") == pytest.approx((1, 128 / 255, 0))
-    assert named_color("colourless") is None
-    assert named_color("0.5") is None  # a grey of matplotlib, but no name

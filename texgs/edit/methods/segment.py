@@ -22,8 +22,10 @@ if TYPE_CHECKING:
     from texgs.edit.task import EditedScene, Task
     from texgs.fields.surfels.model import Surfels
 
-SHOWN_VIEWS = 3  # views of the segment around the object
-POLAR = 20.0  # polar angle of these views, degrees
+CAPTION = (
+    "Clicks with the mask of their view. Most views agree on the segment; the rest of the model is faint."
+)
+CONNECTED_WORDS = " Of what is in the masks, only pieces that hold a click belong to it (connected=true)."
 DIM_OPACITY = 0.15  # opacity outside the segment, in its picture
 
 
@@ -93,7 +95,7 @@ def run(task: Task[SegmentKeys]) -> EditedScene:
     return EditedScene(
         session.scene,
         f"{settings.masks}, {settings.vote}",
-        {"edit.png": "Clicks with the mask of their view, and the segment that all views agree on."},
+        {"edit.png": CAPTION + CONNECTED_WORDS * settings.connected},
         notes={
             "surfels": int(made.lifted.mask.sum()),
             "views": {"used": made.lifted.used, "left out": made.lifted.left_out},
@@ -131,7 +133,7 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
     from texgs.core.figures import write_grid
     from texgs.edit.new_segment import overlay
     from texgs.fields.surfels.model import Surfels
-    from texgs.volume.cameras import orbit_path
+    from texgs.volume.cameras import sights
 
     model, lifted = made.model, made.lifted
     faint = lifted.mask.new_ones(len(model), dtype=torch.float32).masked_fill(~lifted.mask, DIM_OPACITY)
@@ -143,9 +145,9 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
         return of.render(camera.to(task.device), task.scene.light).color.clamp(0, 1)
 
     marked = overlay(shown(model, clicks.camera), lifted.reference, clicks)
-    around = orbit_path(SHOWN_VIEWS, POLAR, task.lens)
-    pictures = [marked, shown(dimmed, clicks.camera), *(shown(dimmed, camera) for camera in around)]
-    titles = ["clicks and mask", "segment", *(f"view {index + 1}" for index in range(SHOWN_VIEWS))]
+    around = {"segment": clicks.camera, **sights(task.lens)}
+    pictures = [marked, *(shown(dimmed, camera) for camera in around.values())]
+    titles = ["clicks and mask", *around]
     write_grid(task.output / "edit.png", {"": [image.cpu().numpy() for image in pictures]}, titles)
 
 

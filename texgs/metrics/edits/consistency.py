@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.metrics.metric import LAST_FRAMES, Measure, MeasuredScene, Metric, SeenView
 
 if TYPE_CHECKING:
+    from texgs.fields.field import Composed
     from texgs.metrics.consistency import Difference, SeenFrame
     from texgs.scene.scene import Scene
 
@@ -32,20 +33,12 @@ class Pairs:
 
         self.measured = measured
         surfaces = without_hidden(read_scene(measured.geometry_file), measured.after)
-        self.depth = kind_of(next(iter(surfaces.models.values())).file).depth or "median"
-        self.surfaces = surfaces.open(measured.shown.device)
+        depth = kind_of(next(iter(surfaces.models.values())).file).depth or "median"
+        opened = surfaces.open(measured.shown.device)
         is_here = measured.vgg and measured.weights["lpips_vgg"]
         self.lpips = Lpips.load(measured.vgg, device=measured.shown.device) if is_here else None
-        self.frame = lru_cache(LAST_FRAMES)(self.frame_at)
+        self.frame = lru_cache(LAST_FRAMES)(partial(seen_frame, measured, opened, depth))
         self.pairs: dict[str, list[Difference]] = {"short": [], "long": []}
-
-    def frame_at(self, place: int) -> SeenFrame:
-        """Return a frame of the path with the depth of the geometry."""
-        from texgs.metrics.consistency import SeenFrame
-
-        camera, shown = self.measured.cameras[place], self.measured.frame(place)
-        surface = self.surfaces.render(camera, outputs=(self.depth,))
-        return SeenFrame(shown.color.clamp(0, 1), getattr(surface, self.depth), surface.alpha, camera)
 
     def see(self, view: SeenView) -> None:
         """Compare a view with the views `SHORT_RANGE` and `LONG_RANGE` later on the path."""
@@ -65,6 +58,15 @@ class Pairs:
         means = {name: mean_differences(pairs) for name, pairs in self.pairs.items() if pairs}
         rmse = {f"{name}_rmse": mean for name, (mean, _) in means.items()}
         return rmse | {f"{name}_lpips": distance for name, (_, distance) in means.items()}
+
+
+def seen_frame(measured: MeasuredScene, surfaces: Composed, depth: str, place: int) -> SeenFrame:
+    """Return a frame of the path with the depth of the geometry."""
+    from texgs.metrics.consistency import SeenFrame
+
+    camera, shown = measured.cameras[place], measured.frame(place)
+    surface = surfaces.render(camera, outputs=(depth,))
+    return SeenFrame(shown.color.clamp(0, 1), getattr(surface, depth), surface.alpha, camera)
 
 
 def without_hidden(geometry: Scene, scene: Scene) -> Scene:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 from statistics import fmean
 from typing import TYPE_CHECKING
 
@@ -34,6 +33,7 @@ class Distances:
         self.measured = measured
         self.targets = [self.target(style) for style in measured.styles]
         self.distances: list[list[tuple[float, float]]] = [[] for _ in self.targets]
+        self.alone = {style.model: alone(measured, style.model) for style in measured.styles if style.model}
 
     def target(self, style: Style) -> StyleTarget:
         """Return the features of a picture's region, or of all of it if the region is too thin."""
@@ -69,16 +69,9 @@ class Distances:
 
         if style.model is None:
             return on_object([view.layers[name][0] for name in STYLE_LAYERS], view.alpha)
-        alone, opened = self.alone(style.model)
-        shown = opened.render(self.measured.cameras[view.place], alone.light, alone.edits)
+        scene, opened = self.alone[style.model]
+        shown = opened.render(self.measured.cameras[view.place], scene.light, scene.edits)
         return self.features(shown.color.clamp(0, 1).permute(2, 0, 1), shown.alpha)
-
-    @cache  # noqa: B019, only for the few models of a scene
-    def alone(self, name: str) -> tuple[Scene, Composed]:
-        """Return the scene of one model, and its composition."""
-        scene = self.measured.after
-        scene = replace(scene, models={name: scene.models[name]})
-        return scene, scene.open(self.measured.shown.device)
 
     def values(self) -> dict[str, float]:
         """Return the means over views and pictures; nothing if a picture's part is in no view."""
@@ -86,6 +79,12 @@ class Distances:
             return {}
         means = [map(fmean, zip(*pairs, strict=True)) for pairs in self.distances]
         return dict(zip(("style_nnfm", "style_gram"), map(fmean, zip(*means, strict=True)), strict=True))
+
+
+def alone(measured: MeasuredScene, name: str) -> tuple[Scene, Composed]:
+    """Return the scene of one model, and its composition."""
+    scene = replace(measured.after, models={name: measured.after.models[name]})
+    return scene, scene.open(measured.shown.device)
 
 
 METRIC = Metric(

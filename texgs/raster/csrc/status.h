@@ -24,6 +24,9 @@ struct OutOfMemory {
     int64_t bytes;
 };
 
+// Thrown by a loop that its caller has stopped.
+struct Stopped {};
+
 template <class Body>
 int32_t guarded(const Body& body) {
     try {
@@ -38,6 +41,9 @@ int32_t guarded(const Body& body) {
     } catch (const std::bad_alloc&) {
         last_error = "not enough memory";
         return TEXGS_OUT_OF_MEMORY;
+    } catch (const Stopped&) {
+        last_error = "stopped by its caller";
+        return TEXGS_STOPPED;
     } catch (const std::exception& e) {
         last_error = e.what();
         return TEXGS_DEVICE_ERROR;

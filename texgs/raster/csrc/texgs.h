@@ -25,7 +25,7 @@
 extern "C" {
 #endif
 
-#define TEXGS_ABI_VERSION 9
+#define TEXGS_ABI_VERSION 10
 #ifndef TEXGS_SOURCES /* the build defines it, see texgs_sources() */
 #define TEXGS_SOURCES "unknown"
 #endif
@@ -38,6 +38,7 @@ typedef enum {
     TEXGS_INVALID_ARGUMENT = 1,
     TEXGS_OUT_OF_MEMORY = 2, /* the sentence says how many bytes were asked for */
     TEXGS_DEVICE_ERROR = 3,
+    TEXGS_STOPPED = 4, /* by the caller, see texgs_set_loops(); outputs are unfinished */
 } texgs_status;
 
 /* Surfels or 3D Gaussians in world space. Their colour has the three channels of a texture, where `base` is given, and
@@ -119,7 +120,10 @@ TEXGS_API const char* texgs_instruction_set(void);
 /* CPU: run parallel loops on the caller's OpenMP runtime (its GOMP_parallel), so that one thread pool serves both;
  * NULL: on threads of our own. */
 TEXGS_API void texgs_use_openmp(void* gomp_parallel);
-TEXGS_API void texgs_set_threads(int32_t threads);
+/* CPU: how parallel loops of the calling thread run: on so many threads, 0 for as many as there are, and until another
+ * thread sets *stop, a number that stays where it is, or NULL, to what is not 0. Loops look at it before each range of
+ * their items; then they end, and so does the call, with TEXGS_STOPPED. A GPU goes on. */
+TEXGS_API void texgs_set_loops(int32_t threads, const int32_t* stop);
 
 /* Projects, sorts and bins, then renders if `image` asks for a colour. */
 TEXGS_API int32_t texgs_forward(const texgs_surfels*, const texgs_camera*, const texgs_options*, const texgs_image*,

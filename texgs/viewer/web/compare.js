@@ -6,7 +6,7 @@ const get = (id) => document.getElementById(id);
 export class Compare {
   #page;
 
-  /** @param {object} page - with canvas, renderer, shown and show() */
+  /** @param {object} page - with canvas, renderer, shown, onScreen and show() */
   constructor(page) {
     this.#page = page;
     get("gain").addEventListener("input", ({ target }) => page.show({ gain: 2 ** target.value }));
@@ -25,13 +25,14 @@ export class Compare {
     this.show();
   }
 
-  /** Show what belongs to the mode. */
+  /** Show what belongs to the mode, and to that on the screen. */
   show() {
-    const { mode, gain, wipe } = this.#page.shown, percent = `${Number((100 / gain).toPrecision(3))} %`;
-    get("wipe").hidden = mode !== "wipe";
+    const { shown: { mode, gain, wipe }, onScreen } = this.#page, percent = `${Number((100 / gain).toPrecision(3))} %`;
+    get("wipe").hidden = onScreen !== "wipe";
     get("wipe").style.left = `${100 * wipe}%`;
     get("wipe").setAttribute("aria-valuenow", Math.round(100 * wipe));
-    get("gain-row").hidden = get("gain-scale").hidden = mode !== "difference";
+    get("gain-row").hidden = mode !== "difference";
+    get("gain-scale").hidden = onScreen !== "difference";
     get("gain").value = Math.log2(gain);
     get("gain-value").textContent = `× ${gain}`;
     get("gain-scale").firstChild.textContent = `−${percent}`;

@@ -6,7 +6,7 @@ export function copyLinkBy(button, page) {
   button.onclick = async () => {
     try {
       await navigator.clipboard.writeText(page.link); // missing where the page came without encryption
-      page.notices.tell("Copied a link to this view, with its bookmarks and edits by numbers.", "info");
+      page.notices.tell("Copied a link to this view, with its bookmarks, colours, light, cuts and functions.", "info");
     } catch {
       page.notices.tell("This browser does not let the page copy: take the link from the address bar.", "error");
     }

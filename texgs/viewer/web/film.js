@@ -1,18 +1,21 @@
-// What a film is like: the way of its camera, its size, how long it is, and how many frames a second it has.
+// What a film is like: the way of its camera, whether edits move, its size, its length and its frames a second.
 
-import { element } from "./inputs.js";
+import { download, element } from "./inputs.js";
 import { numberInput, sizeInputs } from "./size_inputs.js";
+import { difference } from "./state.js";
 
-const KINDS = ["mp4", "gif"];
+const KINDS = ["mp4", "gif", "keys"];
+const TURN = 4; // keys of a turn: more than half of one between two would be the long way
 const get = (id) => document.getElementById(id);
 
 export class FilmInputs {
   #page;
   #size = sizeInputs();
-  #seconds = numberInput("Length, seconds", { min: 0.1, max: 600, value: 2.88 }); // 72 frames
+  #seconds = numberInput("Length, seconds", { min: 0.1, max: 600, value: 4 });
   #fps = numberInput("Frames a second", { min: 1, max: 240, value: 25 });
 
-  #way = element("select", {}, new Option("One turn", "turn"), new Option("Through the bookmarks", "bookmarks"));
+  #way = element("select", {}, new Option("One turn", "turn"), new Option("Through the bookmarks", "bookmarks"),
+    new Option("Bookmarks with their edits", "edits"));
 
   /** @param {ScenePage} page */
   constructor(page) {
@@ -25,16 +28,44 @@ export class FilmInputs {
   /** Begin with the size on the screen. */
   show() {
     this.#size.show(this.#page.renderer.size());
-    this.#way.options[1].disabled = this.#page.bookmarks.poses.length < 2;
-    if (this.#way.options[1].disabled) this.#way.value = "turn";
+    const isTurn = this.#page.bookmarks.kept.length < 2;
+    for (const option of [...this.#way.options].slice(1)) option.disabled = isTurn;
+    if (isTurn) this.#way.value = "turn";
     this.#hide();
   }
 
   get values() {
     if (get("film").disabled) return {};
-    const { value: size } = this.#size, isTurn = this.#way.value === "turn";
-    const stops = isTurn ? [] : this.#page.bookmarks.poses.map((pose) => ({ ...pose, width: size[0], height: size[1] }));
-    return { size, stops, seconds: this.#seconds.input.valueAsNumber, fps: this.#fps.input.valueAsNumber };
+    return { size: this.#size.value, keys: this.#keys, fps: this.#fps.input.valueAsNumber };
+  }
+
+  /** Save the keys as a file, and say how the command line makes the film of them. */
+  save() {
+    const { keys, fps, size: [width, height] } = this.values, { file, past, saved } = this.#page.state;
+    const name = file.replace(/(\.ya?ml)?$/, "-keys.yaml"), { mode } = this.#page.shown;
+    download(new Blob(keys.map((key) => `- ${JSON.stringify(key)}\n`)), name);
+    const options = `--width ${width} --height ${height} --fps ${fps}${mode === "shaded" ? "" : ` --mode ${mode}`}`;
+    const first = saved ? "" : " Save the scene first.";
+    const scene = past.length ? file : "SCENE"; // as it was opened, wherever that is
+    this.#page.notices.tell(`This film again: texgs render ${scene} --film ${name} ${options}.${first}`, "info");
+  }
+
+  /** Keys as `texgs render --film` has them, evenly over all frames; edits are those since the key before. */
+  get #keys() {
+    const { camera, shown, state, bookmarks } = this.#page, fps = this.#fps.input.valueAsNumber;
+    const count = Math.max(2, Math.round(this.#seconds.input.valueAsNumber * fps)), way = this.#way.value;
+    const stops = way === "turn" ? Array(TURN).fill({ pose: camera.pose }) : bookmarks.kept;
+    const at = stops.map((_, i) => Math.round(i * (count - 1) / (stops.length - 1)));
+    let before = shown.before ? state.original : state.scene;
+    return stops.map(({ pose: { azimuth, polar, distance: radius, fov_y, target }, scene }, i) => {
+      const turned = way === "turn" ? azimuth + 360 * at[i] / count : azimuth, edits = [];
+      if (way === "edits") {
+        edits.push(...difference(before, scene).map(({ part, key, value }) => [part ? `${part}.${key}` : key, value]));
+        before = scene;
+      }
+      const seconds = i < at.length - 1 ? { seconds: (at[i + 1] - at[i]) / fps } : {};
+      return { azimuth: turned, polar, radius, fov_y, target, ...seconds, ...Object.fromEntries(edits) };
+    });
   }
 
   /** What is no film has no inputs that a form could require. */

@@ -19,7 +19,11 @@ export function moved(tf, key, index, value, channels, [low, high]) {
   const least = index ? Math.min(points[index - 1][0] + gap, points[index][0]) : low;
   const most = index < points.length - 1 ? Math.max(points[index + 1][0] - gap, points[index][0]) : high;
   const point = [clamp(value, Math.min(least, most), most), ...channels.map((x) => clamp(x, 0, 1))];
-  const changed = { ...tf, [key]: points.with(index, point) };
+  const changed = { ...tf, [key]: points.with(index, point) }, { opacity, color } = changed;
+  if (key === "opacity" && color.length === 1) { // the only colour stays where something is seen
+    const [[at, ...rgb]] = color;
+    changed.color = [[clamp(at, opacity[0][0], opacity.at(-1)[0]), ...rgb]];
+  }
   return isVisible(changed) ? changed : tf;
 }
 

@@ -17,23 +17,21 @@ import { TimeSlider } from "./time.js";
 import { Toolbar } from "./toolbar.js";
 import { TransferEditor } from "./transfer.js";
 
+const PATIENCE = 300; // milliseconds until the page says that it waits for a frame
 const get = (id) => document.getElementById(id);
 
 class Page extends ScenePage {
   constructor(greeting, connection, notices) {
     const { scene, choices, run } = greeting;
     const renderer = new Remote(get("picture"), (text, level) => notices.tell(text, level));
-    renderer.onframe = ({ ms, width, height, ...scores }) => {
-      get("pace").textContent = `${width} × ${height}, ${Math.round(ms)} ms`;
-      get("refused").textContent = "";
-      this.compare?.tell(scores);
-    };
     renderer.onrefused = (why) => {
       get("refused").textContent = why;
+      get("pace").textContent = "";
       this.compare?.tell({});
     };
     renderer.open(connection, scene);
     super(new SharedState(greeting, connection), renderer, notices, () => this.segments.isLocked);
+    renderer.onwait = (view) => this.#wait(view);
     this.run = run;
     this.number = greeting.page;
     this.connection = connection;
@@ -58,8 +56,26 @@ class Page extends ScenePage {
 
   draw(moving) {
     super.draw(moving);
-    this.compare?.show();
     this.looks?.paint();
+  }
+
+  framed(view, { ms, width, height, ...scores }) {
+    super.framed(view);
+    get("pace").textContent = `${this.words(view.mode)[0]}, ${width} × ${height}, ${Math.round(ms)} ms`;
+    get("refused").textContent = "";
+    this.compare?.tell(scores);
+  }
+
+  /** Say after a moment what is being drawn; null: nothing. */
+  #wait(view) {
+    clearTimeout(this.waiting);
+    get("drawing").hidden = true;
+    if (view) this.waiting = setTimeout(() => this.#tellDrawing(view.mode), PATIENCE);
+  }
+
+  #tellDrawing(mode) {
+    get("drawing").textContent = `Drawing: ${this.words(mode)[0]}`;
+    get("drawing").hidden = false;
   }
 
   #segment(model) {

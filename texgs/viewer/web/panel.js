@@ -38,8 +38,8 @@ export class Panel {
     const structure = JSON.stringify(scene.models.map((m) => [m.name, m.can, m.segments.map((s) => s.name)]));
     if (structure !== this.#structure) this.#build(structure);
     for (const model of scene.models) {
-      this.#parts.get(model.name)(model.edit, model);
-      for (const each of model.segments) this.#parts.get(`${model.name}/${each.name}`)(each.edit, model);
+      this.#parts.get(model.name)(model.edit, model, model.styled);
+      for (const each of model.segments) this.#parts.get(`${model.name}/${each.name}`)(each.edit, model, each.styled);
     }
     this.#background.show(scene.background, scene.background.some((x) => x !== 1));
     this.#showSteps();
@@ -102,7 +102,10 @@ export class Panel {
     else legend.append(name);
     if (can.includes("palette")) {
       const color = colorInput("Palette", `palette of ${part}`, edit("palette"));
+      const under = element("p", { className: "hint" }, "A look covers its palette, which still shifts the colours.");
       add(box, "palette", color, (each, model) => each.palette ?? model.fitted_palette);
+      box.append(under);
+      shows.push((each, model, styled) => { under.hidden = !styled; });
     }
     if (can.includes("opacity")) add(box, "opacity", factor("opacity", OPAQUE));
     const factors = Object.entries(FACTORS).filter(([key]) => can.includes(key));
@@ -113,9 +116,9 @@ export class Panel {
       add(material, "tint", colorInput("Tint", `tint of highlights of ${part}`, edit("tint")));
       box.append(material);
     }
-    this.#parts.set(part, (each, model) => {
+    this.#parts.set(part, (each, model, styled) => {
       box.classList.toggle("hidden-part", !each.visible);
-      for (const show of shows) show(each, model);
+      for (const show of shows) show(each, model, styled);
     });
     return box;
   }

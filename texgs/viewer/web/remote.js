@@ -1,12 +1,17 @@
-// The renderer on the server: asks for frames and shows them. The next one is asked for when the last is there.
+// The renderer on the server: asks for frames and shows them. The next one is asked for when the last is there, or
+// at once in place of a whole one, which takes its time.
 
 import { sizeOf } from "./size.js";
 
+const LONGEST = 250; // milliseconds of a frame that count: the first one of a volume reads it
+
 export class Remote {
   #canvas; #context; #notice; #connection;
-  #asked = null; // id of the frame that is on its way
+  #asked = null; // id of the newest frame that is on its way
+  #newest = 0; // id of the frame that was asked for last
   #wanted = null; // the newest view that was not asked for yet
   #latest = null; // the view that was asked for last, to ask again after a break
+  #views = new Map(); // what frames on their way show, and when they were asked for, by their ids
   #count = 0;
   #shown = 0; // id of the frame on the canvas
   #picture = null; // that frame: where two are compared, the other one is to its right
@@ -23,7 +28,9 @@ export class Remote {
     this.#context = canvas.getContext("2d", { alpha: false });
     this.#notice = notice;
     this.modes = [];
-    this.onframe = () => {}; // is called with what the server says about a frame that is shown
+    this.took = 0; // milliseconds from asking to the latest frame of something that moves
+    this.onframe = () => {}; // is called with the view that is on the canvas now, and what the server says about it
+    this.onwait = () => {}; // is called with the view that is asked for, or null when it is there
     this.onrefused = () => {}; // is called with the reason why a frame could not be rendered
   }
 
@@ -41,7 +48,10 @@ export class Remote {
       this.#wanted ??= this.#latest;
       this.#next();
     });
-    connection.addEventListener("lost", () => { this.#asked = null; });
+    connection.addEventListener("lost", () => {
+      this.#asked = null;
+      this.onwait(null);
+    });
   }
 
   /** Size of the picture in pixels of the screen. */
@@ -49,10 +59,11 @@ export class Remote {
     return sizeOf(this.#canvas);
   }
 
-  /** Ask for a frame; of those that cannot be asked for at once, the newest is. */
+  /** Ask for a frame; of those that cannot be asked for at once, the newest is. It stops a whole one on its way. */
   draw(camera, scene, { moving, mode = "shaded", before = false, only = "", gain = 1 }) {
     this.#wanted = { ...this.#view(camera, { mode, before, only, gain }), moving };
-    if (this.#asked === null) this.#next();
+    this.#canvas.setAttribute("aria-busy", "true"); // until a whole frame is there
+    if (this.#asked === null || !this.#latest.moving) this.#next();
   }
 
   /** The point of the scene [3] that a pixel shows; null for the background. */
@@ -83,32 +94,47 @@ export class Remote {
     if (!this.#wanted || !this.#connection?.isOpen) return;
     this.#latest = this.#wanted;
     this.#wanted = null;
-    this.#asked = ++this.#count;
+    this.#asked = this.#newest = ++this.#count;
+    this.#views.set(this.#asked, { ...this.#latest, at: performance.now() });
     this.#connection.send({ type: "view", id: this.#asked, ...this.#latest });
+    this.onwait(this.#latest);
   }
 
   async #receive(data) {
     const length = new DataView(data).getUint32(0, true);
     const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
-    const { camera: { width, height }, mode } = this.#latest;
-    this.#next();
+    const view = this.#arrived(header.id);
     try {
       const picture = await createImageBitmap(new Blob([new Uint8Array(data, 4 + length)]));
-      if (header.id > this.#shown) this.#show(picture, width, height, header, mode === "wipe");
+      if (header.id > this.#shown) this.#show(picture, view, header);
       else picture.close();
     } catch (error) {
       this.#notice(`A frame could not be shown: ${error.message}`, "error");
     }
   }
 
+  /** The view of a frame that is there; those that were asked for before it come no more. */
+  #arrived(id) {
+    const view = this.#views.get(id);
+    for (const each of this.#views.keys()) if (each <= id) this.#views.delete(each);
+    if (view.moving) this.took = Math.min(LONGEST, performance.now() - view.at);
+    if (id === this.#asked) {
+      this.onwait(null);
+      this.#next();
+    }
+    return view;
+  }
+
   /** Show nothing: the frame before is none of what is asked for. */
   #refuse(why) {
     this.#canvas.classList.add("refused");
+    this.#canvas.setAttribute("aria-busy", "false");
+    this.onwait(null);
     this.onrefused(why);
   }
 
-  #show(picture, width, height, header, isPair) {
-    const canvas = this.#canvas;
+  #show(picture, view, header) {
+    const canvas = this.#canvas, { camera: { width, height }, mode } = view, isPair = mode === "wipe";
     canvas.classList.remove("refused");
     if (canvas.width !== width) canvas.width = width;
     if (canvas.height !== height) canvas.height = height;
@@ -117,7 +143,8 @@ export class Remote {
     this.#isPair = isPair;
     this.#paint();
     this.#shown = header.id;
-    this.onframe({ ...header, width: picture.width / (isPair ? 2 : 1), height: picture.height });
+    if (!view.moving && header.id === this.#newest) canvas.setAttribute("aria-busy", "false");
+    this.onframe(view, { ...header, width: picture.width / (isPair ? 2 : 1), height: picture.height });
   }
 
   #paint() {

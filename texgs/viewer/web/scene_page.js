@@ -20,6 +20,7 @@ import { SlicesInScene } from "./slices_in_scene.js";
 import { difference, edited } from "./state.js";
 
 const REST = 100; // milliseconds after the last movement until a whole frame is drawn
+const HELD = 500; // the same while a button is down: a hand that pauses goes on, and needs the processors then
 const ERROR = "Of the worst channel: red where the scene is too bright, blue where it is too dark.";
 const MODES = { // names, and what their colours mean
   shaded: ["Shaded", ""],
@@ -51,6 +52,8 @@ function isDifferent(scene, edit) {
 
 export class ScenePage {
   #resting = 0; // timer
+  #still = REST;
+  #moving = false; // whether the newest frame was drawn for something that moves
   #shown = { mode: "shaded", before: false, only: "", gain: 4, wipe: 0.5, legend: false };
   #isLocked;
   #marks; // what lies over the picture
@@ -65,6 +68,7 @@ export class ScenePage {
     this.canvas = get("picture");
     this.state = state;
     this.renderer = renderer;
+    renderer.onframe = (view, facts) => this.framed(view, facts);
     this.camera = new OrbitCamera(state.scene);
     this.light = new LightControl(get("light"), state, this.camera);
     this.notices = notices;
@@ -82,6 +86,8 @@ export class ScenePage {
       if (this.#shown.before) this.show({ before: false });
     });
     state.addEventListener("change", () => this.draw(true));
+    window.addEventListener("pointerdown", () => this.#hold(HELD), true);
+    for (const end of ["pointerup", "pointercancel"]) window.addEventListener(end, () => this.#hold(REST), true);
     new ResizeObserver(() => this.draw(true)).observe(this.canvas);
     document.addEventListener("refused", ({ detail }) => notices.tell(detail, "error"));
     window.addEventListener("hashchange", () => this.follow());
@@ -110,10 +116,16 @@ export class ScenePage {
   show(values) {
     Object.assign(this.#shown, values);
     get("mode").value = this.#shown.mode;
-    get("mode-legend").textContent = this.#words(this.#shown.mode)[1];
-    get("badge").hidden = !this.#shown.before;
     get("before").setAttribute("aria-pressed", this.#shown.before);
-    this.draw();
+    this.draw(true);
+  }
+
+  /** Say what is on the screen now: it may be older than what is chosen. */
+  framed({ mode, before }) {
+    this.onScreen = mode;
+    get("mode-legend").textContent = this.words(mode)[1];
+    get("badge").hidden = !before;
+    this.compare?.show();
   }
 
   /** Draw a frame; while something moves, a fast one now and a whole one at rest. */
@@ -121,9 +133,21 @@ export class ScenePage {
     this.renderer.draw(this.camera, this.state.scene, { moving, ...this.#shown });
     get("marks").toggleAttribute("hidden", !this.isOfCamera);
     for (const each of this.#marks) each.draw();
+    this.compare?.show();
+    this.#moving = moving;
+    this.#waitForRest();
+  }
+
+  #waitForRest() {
     clearTimeout(this.#resting);
-    const still = Math.max(REST, 2 * (this.renderer.took ?? 0), this.time?.pause ?? 0);
-    this.#resting = setTimeout(() => this.#rest(moving), still);
+    const still = Math.max(this.#still, 2 * this.renderer.took, this.time?.pause ?? 0);
+    this.#resting = setTimeout(() => this.#rest(), still);
+  }
+
+  /** A button or finger goes down or up. */
+  #hold(still) {
+    this.#still = still;
+    if (this.#resting) this.#waitForRest();
   }
 
   /** The camera was moved. */
@@ -164,10 +188,10 @@ export class ScenePage {
     const mode = words.get("mode") ?? "shaded", wrong = modes.includes(mode) ? [] : ["mode"];
     this.camera.goHome(this.canvas.clientWidth, this.canvas.clientHeight);
     this.camera.follow(words, wrong);
-    this.bookmarks.follow(words, wrong);
     this.show({ mode: modes.includes(mode) ? mode : "shaded" });
     const isOfAnother = (words.get("scene") ?? scene.name) !== scene.name;
     const edits = isOfAnother ? [] : editsOf(words.get("edits"), scene, wrong);
+    this.bookmarks.follow(words, edits, wrong);
     const missing = edits.filter((edit) => isDifferent(scene, edit));
     if (missing.length) this.makeEdits(missing);
     if (wrong.length) this.notices.tell(`This page cannot use of the link: ${wrong.join(", ").slice(0, 200)}.`, "error");
@@ -186,11 +210,11 @@ export class ScenePage {
 
   /** Camera, mode, bookmarks and edits as the link has them. */
   get #fragment() {
-    const { mode } = this.#shown, edits = difference(this.state.original, this.state.scene);
+    const { mode } = this.#shown, edits = difference(this.state.original, this.state.scene, true);
     const words = new URLSearchParams();
     if (mode !== "shaded") words.set("mode", mode);
-    if (this.bookmarks.words) words.set("bookmarks", this.bookmarks.words);
-    if (edits.length) {
+    for (const each of this.bookmarks.words) words.append(...each);
+    if (edits.length || words.has("kept")) {
       words.set("scene", this.state.scene.name); // edits of one scene are none of another
       words.set("edits", JSON.stringify(edits));
     }
@@ -198,12 +222,13 @@ export class ScenePage {
   }
 
   /** The name of a mode, and what its colours mean. */
-  #words(mode) {
+  words(mode) {
     return this.state.scene.volume && OF_VOLUME[mode] || MODES[mode];
   }
 
-  #rest(moving) {
-    if (moving) this.renderer.draw(this.camera, this.state.scene, { moving: false, ...this.#shown });
+  #rest() {
+    this.#resting = 0;
+    if (this.#moving) this.renderer.draw(this.camera, this.state.scene, { moving: false, ...this.#shown });
     const { mode, legend } = this.#shown, marked = legend && !OPTIONS[mode] ? " --legend" : ""; // not beside --compare
     const asked = `${OPTIONS[mode] ?? ` --mode ${mode}`}${marked}`;
     get("options").textContent = `texgs render ${this.camera.options(...this.renderer.size())}${asked}`;
@@ -216,7 +241,7 @@ export class ScenePage {
 
   #inputs() {
     const mode = get("mode"), view = get("view"), fov = get("fov");
-    mode.append(...this.renderer.modes.map((name) => new Option(this.#words(name)[0], name)));
+    mode.append(...this.renderer.modes.map((name) => new Option(this.words(name)[0], name)));
     mode.addEventListener("change", () => this.show({ mode: mode.value }));
     const [home, ...trained] = this.state.scene.views.map(({ name }) => new Option(capital(name), name));
     view.append(home, ...Object.keys(AXES).map((name) => new Option(`From ${name}`, name)));

@@ -35,7 +35,7 @@ export class SharedState extends State {
   }
 
   edit(part, key, value, step = 0) {
-    if (this.#send({ type: "edit", part, key, value, step, title: titleOf({ part, key, value }) })) {
+    if (this.#send({ type: "edit", part, key, value, step, title: titleOf({ part, key, value }, this.scene) })) {
       this.update({ scene: edited(this.scene, { part, key, value }) });
     } else {
       this.update({}); // without a connection nothing changes: inputs show what there is

@@ -40,11 +40,6 @@ class StandalonePage extends ScenePage {
     this.follow();
   }
 
-  draw(moving) {
-    super.draw(moving);
-    this.compare?.show();
-  }
-
   /** Show something else; the volume in the page is that of the step with which it begins. */
   show(values) {
     const isNone = OF_TWIN.includes(values.mode ?? this.shown.mode) && this.#isElsewhere;

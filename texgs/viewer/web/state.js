@@ -29,16 +29,17 @@ export function edited(scene, { part, key, value }) {
   return { ...scene, models: scene.models.map((m) => m.name === part ? change(m) : inModel(m)) };
 }
 
-/** The edits that make one description another, as far as it has the same parts. */
-export function difference(from, to) {
+/** The edits that make one description another, as far as it has the same parts, or beside them with `others`. */
+export function difference(from, to, others = false) {
   const edits = [], same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
   for (const key of Object.keys(OF_SCENE)) {
     if (!same(from[key], to[key])) edits.push({ part: "", key, value: to[key] });
   }
   const parts = partsOf(from);
   for (const [part, edit] of partsOf(to)) {
-    for (const [key, value] of Object.entries(parts.has(part) ? edit : {})) {
-      if (!same(parts.get(part)[key], value)) edits.push({ part, key, value });
+    const before = parts.get(part) ?? (others ? UNEDITED : edit);
+    for (const [key, value] of Object.entries(edit)) {
+      if (!same(before[key], value)) edits.push({ part, key, value });
     }
   }
   return edits;
@@ -53,10 +54,32 @@ function partsOf(scene) {
 }
 
 /** What the list of steps calls an edit. */
-export function titleOf({ part, key, value }) {
-  const ofScene = { cuts: titleOfCuts, functions: (functions) => Object.keys(functions).join(", "), markers: titleOfMarkers };
+export function titleOf({ part, key, value }, scene) {
+  if (key === "functions") return titleOfFunctions(scene, value ?? {});
+  const ofScene = { cuts: titleOfCuts, markers: titleOfMarkers };
   const title = value && ofScene[key] ? ofScene[key](value) : titleOfValue(value);
   return `${part} ${key} ${title}`.trim();
+}
+
+/** What a step changes of functions: which ones, and whether they are new or gone, or their points. */
+function titleOfFunctions({ tfs, functions: before }, after) {
+  const names = Object.keys({ ...before, ...after });
+  const changed = names.filter((name) => JSON.stringify(before[name]) !== JSON.stringify(after[name]));
+  return `functions ${changed.map((name) => titleOfFunction(name, before[name] ?? tfs[name], after[name])).join(", ")}`.trim();
+}
+
+function titleOfFunction(name, before, after) {
+  if (!after) return `${name} reset`;
+  if (!before) return `${name} new`;
+  const words = ["opacity", "color"].filter((key) => JSON.stringify(before[key]) !== JSON.stringify(after[key]))
+    .map((key) => titleOfPoints({ opacity: "opacity", color: "colour" }[key], before[key], after[key]));
+  return `${name} ${words.length > 1 ? "moved" : words.join("")}`.trim();
+}
+
+function titleOfPoints(word, before, after) {
+  if (before.length !== after.length) return `${word}, point ${before.length < after.length ? "added" : "removed"}`;
+  const index = after.findIndex((point, i) => JSON.stringify(point) !== JSON.stringify(before[i]));
+  return `${word} at ${Number(after[index][0].toPrecision(3))}`;
 }
 
 function titleOfCuts({ planes, box, faces }) {
@@ -105,7 +128,7 @@ export class State extends EventTarget {
     const latest = step ? `${step} ${part} ${key}` : null;
     const goesOn = latest !== null && latest === this.#latest, edit = { part, key, value };
     if (!goesOn) this.#scenes = [...this.#scenes, this.scene].slice(-MOST_STEPS);
-    const past = [...(goesOn ? this.past.slice(0, -1) : this.past), titleOf(edit)].slice(-MOST_STEPS);
+    const past = [...(goesOn ? this.past.slice(0, -1) : this.past), titleOf(edit, this.scene)].slice(-MOST_STEPS);
     this.#undone = [];
     this.#latest = latest;
     this.update({ scene: edited(this.scene, edit), past, future: [], saved: false });

@@ -7,7 +7,8 @@ import { PageInputs } from "./page_inputs.js";
 import { PictureDialog } from "./size_inputs.js";
 
 const EXPORTS = {
-  mp4: "Film, MP4", gif: "Film, GIF", html: "Web page", volume: "Web page with the volume, 2 MB more",
+  mp4: "Film, MP4", gif: "Film, GIF", keys: "Keys of a film, YAML",
+  html: "Web page", volume: "Web page with the volume, 2 MB more",
   "3dgs": "3D Gaussians, PLY", "2dgs": "2D Gaussians, PLY", points: "Points, PLY", mesh: "Mesh, PLY",
   usd: "Splats with light, OpenUSD", gltf: "Splats with light, glTF", spz: "Splats with light, SPZ", vtp: "Surfels as polygons, VTK",
 };
@@ -25,7 +26,8 @@ export class Toolbar {
     new EditHistory(page, { s: () => this.#askForName() });
     get("still").onclick = () => this.#still();
     new PictureDialog(page, (how) => this.#still(how));
-    get("export-kind").append(...exports.map((kind) => new Option(EXPORTS[kind] ?? kind, kind)));
+    const kinds = [...exports.slice(0, 2), "keys", ...exports.slice(2)]; // behind films
+    get("export-kind").append(...kinds.map((kind) => new Option(EXPORTS[kind] ?? kind, kind)));
     this.#film = new FilmInputs(page);
     this.#pageInputs = new PageInputs(page.state.scene);
     get("export").onclick = () => this.#export();
@@ -66,7 +68,8 @@ export class Toolbar {
     this.#film.show();
     this.#pageInputs.show();
     const kind = await ask(get("export-dialog"), get("export-kind").value);
-    if (kind === null || !this.#page.mayBegin()) return;
+    if (kind === "keys") this.#film.save();
+    if (kind === null || kind === "keys" || !this.#page.mayBegin()) return;
     const { size, ...film } = this.#film.values;
     this.#page.job.begin({ type: "export", kind, view: this.#view(size), ...film, ...this.#pageInputs.values });
   }

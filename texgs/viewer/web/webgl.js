@@ -37,6 +37,7 @@ export class WebglRenderer {
     this._notice = notice;
     this._share = 1; // of the sides of a frame, while something moves
     this.took = 0; // milliseconds of the latest of these frames
+    this.onframe = () => {}; // is called with what a frame shows that is on its way to the canvas
     canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault(); // asks for another context
       this._begun = null;
@@ -92,7 +93,7 @@ export class WebglRenderer {
    *   slow frames are coarser; `gain` of a difference, and the part of the width before the line of a `wipe`.
    */
   draw(camera, scene, { before = false, ...shown } = {}) {
-    this._wanted = { view: this._view(camera), scene: before ? this._before(scene) : scene, shown };
+    this._wanted = { view: this._view(camera), scene: before ? this._before(scene) : scene, shown: { ...shown, before } };
     this._ask();
   }
 
@@ -208,6 +209,7 @@ export class WebglRenderer {
     const gl = this._gl, { moving } = shown, share = moving ? this._share : 1, at = performance.now();
     const [width, height] = [view.width, view.height].map((side) => Math.ceil(share * side));
     this._isAsked = false;
+    this.onframe(shown);
     this._frame({ ...view, width, height }, scene, shown);
     this._begun = { at, share, moving, fence: gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0) };
     gl.flush();

@@ -17,7 +17,7 @@ from texgs.workflow.stages.settings import FitLabel, OfVolume
 if TYPE_CHECKING:
     from texgs.scene.scene import SceneVolume
 
-AZIMUTH, POLAR = -60.0, 20.0  # of the picture, degrees
+SCENE_WORDS = "The scene as fitted."
 
 
 @dataclass(kw_only=True)
@@ -34,16 +34,17 @@ class Settings(OfVolume):
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
-    """Write scene.yaml, in which nothing is edited, and scene.png.
+    """Write scene.yaml, in which nothing is edited, scene.png, and where there is a volume volume.png.
 
     It reads model.safetensors of each basic TF, and `volume`, the volume.nrrd, where there is one.
     """
-    from texgs.core.camera import orbit
     from texgs.core.check import torch_device
     from texgs.core.movie import write_frames
     from texgs.scene.frame import frame
     from texgs.scene.scene import Scene, SceneModel
     from texgs.scene.scene_file import write_scene
+    from texgs.scene.shot import Shot
+    from texgs.scene.twin import Twin
     from texgs.volume.framing import frame_of
 
     models = {
@@ -57,10 +58,14 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         scene = replace(scene, frame=frame_of(grid, framing), space=grid.world)
     write_scene(output / SCENE, scene)
     composition = scene.open(torch_device(settings.fit.device))
-    camera = orbit(AZIMUTH, POLAR, *scene.framed(composition).lens(settings.fov_y).square(settings.image))
-    picture = frame(composition, camera, scene)
-    write_frames(output / "scene.png", [picture])
-    return Outcome(SceneResult(len(scene.models), len(composition)))
+    shot = Shot(width=settings.image, fov_y=settings.fov_y)
+    camera, pictures = shot.camera(scene.framed(composition)), {"scene.png": SCENE_WORDS}
+    write_frames(output / "scene.png", [frame(composition, camera, scene)])
+    if scene.volume is not None:
+        pictures["volume.png"] = "The volume, by ray casting."
+        truth = frame(composition, camera, scene, "volume", Twin(scene, composition.device))
+        write_frames(output / "volume.png", [truth])
+    return Outcome(SceneResult(len(scene.models), len(composition)), pictures)
 
 
 def volume_of(settings: Settings, volume: Path) -> SceneVolume:
@@ -84,7 +89,7 @@ STAGE = Stage(
         (SCENE, "scene.png"),
         target="scenes",
         gpu=("fit",),
-        shown={"scene.png": "The basic models as one scene, rendered from their primitives."},
+        shown={"scene.png": SCENE_WORDS},
     ),
     inputs=models_and_volume,
     work=work,

@@ -6,7 +6,7 @@ from pathlib import Path
 from texgs.core.io import write_bytes
 from texgs.core.memory import MIB
 from texgs.core.names import PAGE
-from texgs.edit.method import methods
+from texgs.edit.method import NO_METHOD, methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import PageResult
 from texgs.workflow.inputs import fitted_scene, is_fit, is_swept, models_of_scene
@@ -23,7 +23,6 @@ class Settings(OfDataset):
     fit: FitLabel
     look: str = read("edit.name")  # or "none"
     look_seed: int = read("edit.seed")
-    embedded: float = read("page.embedded")  # MiB of the largest page that the report holds
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -35,13 +34,13 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.viewer.standalone import write_page
 
     scene = read_scene(inputs["scene"])
-    parts = [settings.dataset, settings.fit.name, *([settings.look] if settings.look != "none" else [])]
+    parts = [settings.dataset, settings.fit.name, *([settings.look] if settings.look != NO_METHOD else [])]
     file = output / PAGE
     page = write_page(file, scene, " ".join(parts))
     write_bytes(output / "poster.jpg", page.poster)
-    mib = file.stat().st_size / MIB
-    result = PageResult(settings.look, page.surfels, mib, mib <= settings.embedded)
-    return Outcome(result, {"poster.jpg": SHOWN})
+    result = PageResult(settings.look, page.surfels, file.stat().st_size / MIB)
+    words = "The scene without edits." if settings.look == NO_METHOD else "The edited scene."
+    return Outcome(result, {"poster.jpg": words})
 
 
 def inputs(config: Config) -> dict[str, Path]:

@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "../texgs.h"
+#include "../status.h"
 
 namespace texgs {
 namespace {
@@ -18,6 +18,7 @@ struct Loop {
     int64_t n, grain;
     Job job;
     void* context;
+    const int32_t* stop;  // of the caller, which another of its threads may set; or null
     std::atomic<int64_t> next{0};
     std::atomic<int> workers{0};
 
@@ -25,10 +26,11 @@ struct Loop {
         const int worker = workers.fetch_add(1, std::memory_order_relaxed);
         for (;;) {
             const int64_t begin = next.fetch_add(grain, std::memory_order_relaxed);
-            if (begin >= n) return;
+            if (begin >= n || is_stopped()) return;
             job(context, begin, std::min(begin + grain, n), worker);
         }
     }
+    bool is_stopped() const { return stop && *static_cast<const volatile int32_t*>(stop) != 0; }
 };
 
 void work_on(void* loop) { static_cast<Loop*>(loop)->work(); }
@@ -94,19 +96,12 @@ private:
 using GompParallel = void (*)(void (*)(void*), void*, unsigned threads, unsigned flags);
 std::atomic<GompParallel> gomp_parallel{nullptr};
 thread_local int thread_count = 0;  // of the caller: two callers may want different numbers
+thread_local const int32_t* stop_flag = nullptr;
 thread_local bool inside_loop = false;
 
-}  // namespace
-
-int threads() {
-    return thread_count > 0 ? thread_count : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-}
-
-void run_parallel(int64_t n, int64_t grain, Job job, void* context) {
-    if (n <= 0) return;
-    Loop loop{n, grain, job, context};
+void run(Loop& loop) {
     const int wanted = threads();
-    if (wanted <= 1 || n <= grain || inside_loop) return loop.work();
+    if (wanted <= 1 || loop.n <= loop.grain || inside_loop) return loop.work();
     // Always the whole team, even for fewer ranges: OpenMP ends the threads that a smaller team leaves over.
     struct Inside {
         Inside() { inside_loop = true; }
@@ -122,7 +117,21 @@ void run_parallel(int64_t n, int64_t grain, Job job, void* context) {
     }
 }
 
+}  // namespace
+
+int threads() {
+    return thread_count > 0 ? thread_count : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+void run_parallel(int64_t n, int64_t grain, Job job, void* context) {
+    if (n <= 0) return;
+    // Nothing may be thrown through OpenMP: a loop inside of another one goes on, and the outer one stops.
+    Loop loop{n, grain, job, context, inside_loop ? nullptr : stop_flag};
+    run(loop);
+    if (loop.is_stopped()) throw Stopped{};
+}
+
 }  // namespace texgs
 
 void texgs_use_openmp(void* parallel) { texgs::gomp_parallel = reinterpret_cast<texgs::GompParallel>(parallel); }
-void texgs_set_threads(int32_t n) { texgs::thread_count = n; }
+void texgs_set_loops(int32_t n, const int32_t* stop) { texgs::thread_count = n, texgs::stop_flag = stop; }

@@ -13,7 +13,7 @@ using Job = void (*)(void* context, int64_t begin, int64_t end, int worker);
 void run_parallel(int64_t n, int64_t grain, Job job, void* context);
 
 // Calls body(begin, end, worker) on disjoint ranges of at most `grain` that cover [0, n). Which worker gets which
-// range varies: a result must not depend on it.
+// range varies: a result must not depend on it. Throws Stopped where the caller has stopped its loops meanwhile.
 template <class Body>
 void parallel_for(int64_t n, int64_t grain, Body&& body) {
     using Plain = std::remove_reference_t<Body>;

@@ -16,7 +16,7 @@ const char* texgs_sources(void) { return TEXGS_SOURCES; }
 const char* texgs_error(void) { return last_error.c_str(); }
 int64_t texgs_memory(int32_t reset) { return texgs::cuda::memory_peak(reset != 0); }
 void texgs_use_openmp(void*) {}
-void texgs_set_threads(int32_t) {}
+void texgs_set_loops(int32_t, const int32_t*) {}
 
 const char* texgs_instruction_set(void) {
     static const std::string architectures = [] {
