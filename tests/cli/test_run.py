@@ -51,12 +51,12 @@ def test_what_snakemake_would_read_otherwise_is_told(entry, named):
 @pytest.mark.parametrize(
     ("words", "profile"),
     [
-        (["-n"], "profiles/local for"),
+        (["-n"], ""),
         (["-n", "--workflow-profile", "slurm"], "profiles/slurm for"),
         (["-n", "--workflow-profile=none"], ""),
     ],
 )
-def test_the_local_profile_unless_another_is_given(tmp_path, words, profile):
+def test_a_profile_that_is_asked_for_is_named(tmp_path, words, profile):
     done = texgs(tmp_path, "run", *words, "nonsense=1")
     assert done.returncode == 2
     assert profile in done.stderr
