@@ -23,12 +23,12 @@ class Overview:
 
 
 def overviews_of(records: Sequence[Record[Any]], pictures: Sequence[Figure]) -> list[Overview]:
-    """Return the overviews of all data sets in order, with what belongs to them of some pictures."""
+    """Return the overviews of data sets, those with a scene first, with what belongs to them of pictures."""
     by_title: dict[str, list[Record[Any]]] = {}
     for record in in_order(records):
         by_title.setdefault(record.title, []).append(record)
     overviews = []
-    for title, own in by_title.items():
+    for title, own in sorted(by_title.items(), key=lambda item: first_scene(item[1]) is None):
         scene = first_scene(own)
         labels = ("", scene.label if scene else "")
         shown = [each for each in pictures if each.dataset == title and each.label in labels]
