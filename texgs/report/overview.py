@@ -25,7 +25,7 @@ class Overview:
 
 
 def overviews_of(records: Sequence[Record[Any]], pictures: Sequence[Figure]) -> list[Overview]:
-    """Return the overviews of all data sets in order, with what belongs to them of some pictures.
+    """Return the overviews of data sets, those with a scene first, with what belongs to them of pictures.
 
     Of several recipes, that is one of surfels.
     """
@@ -40,7 +40,7 @@ def overviews_of(records: Sequence[Record[Any]], pictures: Sequence[Figure]) -> 
         shown = [each for each in pictures if each.dataset == title and each.label in ("", name)]
         words = (what(own, scene), quality([each for each in own if scene and each.label == name]), time(own))
         overviews.append(Overview(title, shown, list(filter(None, words))))
-    return overviews
+    return sorted(overviews, key=lambda each: not each.figures)
 
 
 def what(records: Sequence[Record[Any]], scene: Record[SceneResult] | None) -> str:
