@@ -66,7 +66,7 @@ def test_a_study_is_made_answered_and_counted(results, capsys):
     assert main(["votes"]) == 0
     table = (results / "tables" / "user_study.md").read_text()
     assert capsys.readouterr().out.strip() == table.strip()
-    assert "Table A6. User study" in table
+    assert "## User study" in table
     line = r"\| image-driven \| all 1 \| - \| plenoxels_quick \| stylesplat_quick \| arf \| 2 \| 0 \| 0 \|"
     assert re.search(line, table)
     assert "| image-driven | wood | - | - | the paper | TexGS-VolVis | 8 | 2 | 0 | 0 |" in table

@@ -235,6 +235,12 @@ def test_a_data_set_without_a_fit_is_told_too(tmp_path, folder):
     assert words == ["Views, shown by TF01.", "All jobs took 1 s, added up, 0 s of it for fits, on CPU."]
 
 
+def test_a_data_set_without_a_scene_stands_behind(tmp_path, folder):
+    volume = VolumeResult([9, 8, 7], "uint8", [1.0] * 3, [0.0] * 3, 0.0, 1.0, 504, 0.1)
+    paths = [job(folder, "volume", volume, recipe="", dataset="another"), *own_run(folder)]
+    assert page(tmp_path, paths).of("h2")[:2] == ["mine", "another"]
+
+
 def test_own_data_have_plain_titles(tmp_path, folder):
     """The paper's numbers of tables, and where we differ from it, stand beside its data alone."""
     own = page(tmp_path, own_run(folder))

@@ -88,6 +88,14 @@ def test_it_takes_few_bytes_and_tells_how_many(scene, tmp_path):
     assert str(light) in (tmp_path / "lit.html").read_text()
 
 
+def test_a_page_without_the_volume_says_that_its_cuts_have_no_faces(scene, tmp_path):
+    cut = replace(scene, light=HEADLIGHT, cuts=Cuts((Plane((1.0, 0.0, 0.0), 0.0),)))
+    (note,) = export(tmp_path / "cut.html", cut, Export("html"))
+    assert note == "Cuts in the page: without faces, which need the volume, too (--volume)"
+    (note,) = export(tmp_path / "whole.html", cut, Export("html", volume=1.0))
+    assert note.startswith("Volume in the page: ")
+
+
 def test_pages_can_shadow_with_the_volume_or_where_the_scene_has_shadows(scene):
     plain = replace(scene, light=LAMP.unhidden)
     page = scene_page(plain, "plain")

@@ -13,6 +13,7 @@ from texgs.workflow.stage_table import RULES, STAGES
 ROOT = Path(__file__).parents[2]
 PROFILES = sorted((ROOT / "workflow" / "profiles").glob("*/profile.yaml"))
 PAGE = (ROOT / "docs" / "workflow.md").read_text()
+BLOCKS = re.findall(r"```yaml\n(.*?)```", PAGE, flags=re.DOTALL)
 BY_RULE = ("set-threads", "set-resources", "groups")
 NAMES = {*RULES, "tables", "report"}
 
@@ -29,10 +30,9 @@ def test_profiles_name_rules_that_exist(path):
 
 
 def test_the_page_of_clusters_names_rules_that_exist():
-    blocks = re.findall(r"```yaml\n(.*?)```", PAGE, flags=re.DOTALL)
     words = re.findall(rf"--(?:{'|'.join(BY_RULE)}) ((?:\w+[=:]\S+ ?)+)", PAGE)
     in_words = {re.split("[=:]", word)[0] for some in words for word in some.split()}
-    in_blocks = set().union(*(named(yaml.safe_load(block)) for block in blocks))
+    in_blocks = set().union(*(named(yaml.safe_load(block)) for block in BLOCKS))
     assert in_words
     assert in_blocks
     assert in_words | in_blocks <= NAMES
@@ -40,7 +40,7 @@ def test_the_page_of_clusters_names_rules_that_exist():
 
 def test_every_rule_with_a_gpu_is_in_the_example_of_the_page():
     with_gpu = {rule.name for rule in RULES.values() if rule.gpu}
-    example = re.search(r"name it for these rules, [^\n]*:\n\n```yaml\n(.*?)```", PAGE, flags=re.DOTALL)[1]
+    [example] = [block for block in BLOCKS if "set-resources" in block]
     shown = yaml.safe_load(example)["set-resources"]
     assert set(shown) == with_gpu
     profile = yaml.safe_load((ROOT / "workflow" / "profiles" / "slurm" / "profile.yaml").read_text())

@@ -65,10 +65,12 @@ def overview() -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"texgs {__version__}")
     others = {*kinds(), *(f"edit_{name}" for name, each in methods().items() if each.fields)} - {"surfels"}
     for title, names in {
-        "every day": FIRST_VERBS,
-        "beside": LATER_VERBS,
+        "everyday verbs": FIRST_VERBS,
+        "results, studies and weights": LATER_VERBS,
         "steps of texgs run, one at a time": [name for name in STAGE_VERBS if name not in others],
-        "the same of other fields, to compare with": [name for name in STAGE_VERBS if name in others],
+        "steps of other fields and methods, to compare with": [
+            name for name in STAGE_VERBS if name in others
+        ],
     }.items():
         group = top.add_argument_group(title)
         for name in names:

@@ -75,7 +75,7 @@ def snakemake(words: Sequence[str]) -> bool:
             rest.remove(word)
         if outside := no_project():
             print(f"texgs: {outside}; results are written here", file=sys.stderr)
-        if profiles := profiles_of(given):
+        if (profiles := profiles_of(given)) and (given.profile or given.workflow_profile):
             print(f"Using profile {' and '.join(profiles)} for options that are not given", file=sys.stderr)
         options = parser_of(profiles).parse_args([*defaults(given), *rest])
     options.targets = targets

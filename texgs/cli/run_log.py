@@ -67,7 +67,8 @@ class LogHandler(LogHandlerBase):
         super().close()
 
     def _bars(self) -> Table:
-        table = Table.grid(*[Column(no_wrap=True)] * 3, Column(overflow="ellipsis"), padding=(0, 2))
+        narrow = (Column(no_wrap=True) for _ in range(3))
+        table = Table.grid(*narrow, Column(overflow="ellipsis"), padding=(0, 2))
         rows = [("all jobs", self._start, f": {self._done} of {self._total} jobs")]
         rows += [(title(job), job.created, text_of(job)) for job in list(self._jobs.values())]
         for name, start, text in rows:

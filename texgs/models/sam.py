@@ -75,8 +75,8 @@ class Sam:
             box = (torch.stack([at.amin(0), at.amax(0) + 1]) * scale - 0.5).to(self.device).reshape(1, 4)
         logits, quality = self._decode(self._features(image), places, labels, box, several)
         square = F.interpolate(logits[None].float(), (self.size, self.size), mode="bilinear")
-        found = F.interpolate(square[..., :height, :width], shape, mode="bilinear")[0] > 0
-        return best_of(found.to(image.device), quality.to(image.device), points.long(), shown)
+        masks = F.interpolate(square[..., :height, :width], shape, mode="bilinear")[0] > 0
+        return best_of(masks.to(image.device), quality.to(image.device), points.long(), shown)
 
 
 def best_of(masks: Tensor, quality: Tensor, points: Tensor, shown: Pixels = None) -> Tensor:

@@ -7,7 +7,6 @@ from statistics import fmean
 from typing import Any
 
 from texgs.core.progress import time_text
-from texgs.metrics.quality import WHOLE_SHARE
 from texgs.report.fit_tables import end_of, runs_of
 from texgs.report.metrics_files import Record, of
 from texgs.report.published import in_order
@@ -25,7 +24,7 @@ class Overview:
 
 
 def overviews_of(records: Sequence[Record[Any]], pictures: Sequence[Figure]) -> list[Overview]:
-    """Return the overviews of all data sets in order, with what belongs to them of some pictures.
+    """Return the overviews of data sets, those with a scene first, with what belongs to them of pictures.
 
     Of several recipes, that is one of surfels.
     """
@@ -40,7 +39,7 @@ def overviews_of(records: Sequence[Record[Any]], pictures: Sequence[Figure]) -> 
         shown = [each for each in pictures if each.dataset == title and each.label in ("", name)]
         words = (what(own, scene), quality([each for each in own if scene and each.label == name]), time(own))
         overviews.append(Overview(title, shown, list(filter(None, words))))
-    return overviews
+    return sorted(overviews, key=lambda each: not each.figures)
 
 
 def what(records: Sequence[Record[Any]], scene: Record[SceneResult] | None) -> str:
@@ -57,19 +56,24 @@ def what(records: Sequence[Record[Any]], scene: Record[SceneResult] | None) -> s
 
 def quality(records: Sequence[Record[Any]]) -> str:
     """Describe the test views of a recipe's fits: errors on the object, and whether parts are missing."""
+    from texgs.metrics.quality import WHOLE_SHARE
+
     ends = {end.tf: end.result for run in runs_of(records) if (end := end_of(run))}
     levels = {tf: each.object_psnr for tf, each in ends.items() if each.object_psnr is not None}
     if not levels:
         return ""
     level, (worst, least) = fmean(levels.values()), min(levels.items(), key=itemgetter(1))
-    shown = min(each.shown or 0.0 for tf, each in ends.items() if tf in levels)
     spread = f"; {worst} has the least with {least:.1f} dB" if len(levels) > 1 else ""
-    return (
+    words = (
         "In test views, which no fit has seen, colours on the object are off by about "
-        f"{100 * 10 ** (-level / 20):.1f} % of full brightness ({level:.1f} dB{spread}). "
-        f"{'Nothing is' if shown >= WHOLE_SHARE else 'Parts are'} missing: "
-        f"the scene shows {100 * shown:.1f} % of what is there."
+        f"{100 * 10 ** (-level / 20):.1f} % of full brightness ({level:.1f} dB{spread})."
     )
+    shares = [share for tf in levels if (share := ends[tf].shown) is not None]
+    if len(shares) == len(levels):  # fits by an older version have none
+        shown = min(shares)
+        missing = "Nothing is" if shown >= WHOLE_SHARE else "Parts are"
+        words += f" {missing} missing: the scene shows {100 * shown:.1f} % of what is there."
+    return words
 
 
 def time(records: Sequence[Record[Any]]) -> str:

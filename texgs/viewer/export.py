@@ -31,5 +31,7 @@ def export(path: Path, scene: Scene, keys: Export, checked: str = "", name: str 
         require_export(kind_of(entry.file), "html")
     volume = None if keys.volume is None else page_volume(shown, keys.volume)
     page = write_page(path, shown, name or path.stem, checked, volume, keys.steps)
-    told = {"Volume": volume, "Series": page.steps, "Light": page.light}
+    bare = shown.cuts and shown.volume and volume is None
+    cuts = "without faces, which need the volume, too (--volume)" if bare else None
+    told = {"Volume": volume, "Series": page.steps, "Light": page.light, "Cuts": cuts}
     return [f"{title} in the page: {what}" for title, what in told.items() if what is not None]
