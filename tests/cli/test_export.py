@@ -1,9 +1,11 @@
 """Exports from the command line: of surfels, of Gaussians, and of what other programs have fitted."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import pyvista
 import torch
 from plyfile import PlyData
 
@@ -125,6 +127,20 @@ def test_a_mesh_of_surfels(scene, model, tmp_path, kind):
     assert vertices["red"].max() > 25
 
 
+@pytest.mark.parametrize(("name", "words"), [("m.obj", []), ("m.glb", ["--model", "A"])])
+def test_a_textured_mesh_tells_how_far_it_is_from_the_scene(scene, tmp_path, capsys, name, words):
+    more = (*MESH[:-1], "textured", "--faces", "900", "--texture", "256", *words)
+    assert export(scene, tmp_path / name, *more) == 0
+    mesh = pyvista.read(tmp_path / name)
+    mesh = mesh.combine() if isinstance(mesh, pyvista.MultiBlock) else mesh
+    assert 0 < mesh.n_cells <= 900
+    assert re.search(
+        rf"{name}: {mesh.n_cells} triangles, (closed|not closed: [\d,]+ edges are open); "
+        r"\d+\.\d dB from the scene in 12 views, and \d+\.\d % of the opacity is where it has no surface\n",
+        capsys.readouterr().err,
+    )
+
+
 def test_a_mesh_of_gaussians_is_where_they_are(tmp_path):
     source = write_gaussians(tmp_path / "ball.safetensors", sphere_of_gaussians())
     assert export(source, tmp_path / "mesh.ply", *MESH) == 0
@@ -173,11 +189,13 @@ def test_clouds_of_what_others_have_fitted(tmp_path, ending):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--to", "x.obj"], f"expected a file that ends in {' or '.join(ENDINGS)}, got x.obj"),
+        (["--to", "x.stl"], f"expected a file that ends in {' or '.join(ENDINGS)}, got x.stl"),
         (["--to", "x.ply", "--kind", "usd"], "expected a file that ends in .usdc or .usda, got x.ply"),
         (["--to", "x.glb", "--model", "C"], "model: expected one of A, B, got C"),
         (["--to", "x.texgs"], "kind compact: expected one model, got a scene"),
-        (["--to", "x.glb", "--voxel", "0.1"], "voxel: expected kind mesh, got gltf"),
+        (["--to", "x.glb", "--voxel", "0.1"], "voxel: expected kind mesh or textured, got gltf"),
+        (["--to", "x.glb", "--faces", "9"], "faces: expected kind textured, got gltf"),
+        (["--to", "x.obj", "--texture", "1000"], "texture: expected a power of two, such as 2048, got 1000"),
         (["--to", "x.ply", "--steps", "one"], "steps: expected kind html, got 3dgs"),
         (["--to", "x.html", "--volume"], "volume: expected the volume that the scene was made from"),
         (["--to", "x.ply", "--kind", "mesh", "--size", "0"], "--size: expected at least 1, got 0"),

@@ -1,13 +1,17 @@
 """Files that a page saves: what is in them, and what cannot be written."""
 
 import io
+from dataclasses import dataclass
 
 import numpy as np
+import pytest
 from PIL import Image, ImageSequence
 from plyfile import PlyData
 
 from tests.viewer.pages import TOKEN, on_page
 from tests.viewer.test_messages import CAMERA
+from texgs.scene import export_keys
+from texgs.scene.export_keys import Export
 from texgs.scene.film import Film
 from texgs.scene.shot import Shot
 from texgs.viewer.downloads import exports_of
@@ -23,6 +27,17 @@ async def saved(browser, client, kind, **film):
     async with client.get(f"/{TOKEN}/files/{news['name']}") as answer:
         assert answer.status == 200
         return news["name"], await answer.read()
+
+
+@dataclass(frozen=True)
+class Small(Export):
+    """Options of an export in seconds."""
+
+    views: int = 12
+    size: int = 64
+    voxel: float = 0.05
+    faces: int = 100
+    texture: int = 64
 
 
 @on_page
@@ -66,6 +81,11 @@ async def test_the_scene_is_written_as_it_is_shown(browser, client):
     assert counts[1] == counts[0] // 2
     name, binary = await saved(browser, client, "gltf")
     assert name == "scene.glb"
+    assert binary.startswith(b"glTF")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(export_keys, "Export", Small)
+        name, binary = await saved(browser, client, "textured")
+    assert name == "scene-textured.glb"
     assert binary.startswith(b"glTF")
     name, page = await saved(browser, client, "html")
     assert name == "scene.html"

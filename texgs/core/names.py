@@ -18,6 +18,7 @@ EXPORTS = {  # endings of what `texgs export` writes, by its kind
     **dict.fromkeys(("3dgs", "2dgs", "release", "points", "mesh"), (".ply",)),
     **{"compact": (".texgs",), "html": (".html",)},
     **{"usd": (".usdc", ".usda"), "gltf": (".glb",), "spz": (".spz",), "vtp": (".vtp",)},
+    "textured": (".glb", ".obj"),
 }
 SCENE, METRICS, PAGE = "scene.yaml", "metrics.json", "scene.html"  # as jobs write them
 STYLE = "style"  # how the names of pictures begin that looks follow

@@ -1,7 +1,6 @@
 """Files of a scene or a model for other programs: splats, points or a mesh; or a compact model file."""
 
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -26,21 +25,23 @@ from texgs.fields.surfels.compact import seen_surfels, write_compact
 from texgs.fields.surfels.composition import Composition, EditableModel
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.ply import write_ply as write_surfels
-from texgs.raster import Render
 from texgs.raster.shading import Y00
 from texgs.scene.bounds import bounds_of
 from texgs.scene.clouds import clouds_of
 from texgs.scene.clouds import place_cloud as placed_cloud
-from texgs.scene.export_keys import CLOUD_KINDS, FILE_SPACE_KINDS, Export
+from texgs.scene.export_keys import CLOUD_KINDS, FILE_SPACE_KINDS, MESH_KINDS, Export
 from texgs.scene.gltf import write_gltf
 from texgs.scene.joined import join_surfels, write_vtp
 from texgs.scene.mesh import depth_views, fuse, place_mesh, write_mesh
 from texgs.scene.scene import Scene
 from texgs.scene.spz import write_spz
+from texgs.scene.textured import notes_on, textured
+from texgs.scene.textured_files import write_glb, write_obj
 from texgs.scene.usd import write_usd
-from texgs.volume.cameras import icosphere_of
+from texgs.volume.cameras import icosphere_of, spiral
 from texgs.volume.space import Space
 
+TEST_VIEWS = 12  # that tell how far a textured mesh is from the scene
 BAKED_NOTE = (
     "Surfels have one colour each, the mean of their texture, with the light of the scene as harmonics"
 )
@@ -56,16 +57,19 @@ def write_export(path: Path, scene: Scene, keys: Export) -> list[str]:
     require_other(path, scene)
     for entry in shown.models.values():
         require_export(files.kind_of(entry.file), kind)
-    keys = replace(keys, kind=kind)
-    if keys.model is not None and kind not in CLOUD_KINDS:
+    keys, notes = replace(keys, kind=kind), list[str]()
+    if kind in MESH_KINDS:
+        notes += export_surface(path, shown, keys)
+    elif keys.model is not None and kind not in CLOUD_KINDS:
         export_model(path, shown.models[keys.model].open()[0], keys, shown.space)
-        return []
-    export_scene(path, shown, keys)
+    else:
+        export_scene(path, shown, keys)
+    if keys.model is not None and kind not in CLOUD_KINDS:
+        return notes
     is_lost = kind in FILE_SPACE_KINDS and keys.space is None and shown.space is None
     lost = "in world units: the scene knows no space of a file; texgs compose writes it where there is one"
-    return (
-        [BAKED_NOTE] * (kind in CLOUD_KINDS) + ["its cuts are left out"] * bool(shown.cuts) + [lost] * is_lost
-    )
+    notes += [BAKED_NOTE] * (kind in CLOUD_KINDS) + ["its cuts are left out"] * bool(shown.cuts)
+    return notes + [lost] * is_lost
 
 
 def single_model(scene: Scene, model: str | None) -> Scene:
@@ -127,7 +131,6 @@ def require_other(path: Path, scene: Scene) -> None:
 
 def export_scene(path: Path, scene: Scene, keys: Export) -> Path:
     """Export the visible models of a scene as a single one."""
-    field = files.kind_of(next(iter(scene.models.values())).file)
     space, facts = target_of(keys, scene.space), facts_of(keys, scene.space)
     if keys.kind in CLOUD_KINDS:
         clouds = [cloud if space is None else placed_cloud(cloud, space) for cloud in clouds_of(scene)]
@@ -135,23 +138,45 @@ def export_scene(path: Path, scene: Scene, keys: Export) -> Path:
             return write_spz(path, clouds)
         return (write_usd if keys.kind == "usd" else write_gltf)(path, clouds, facts)
     composed, edits = scene.open(torch_device(keys.device)), scene.edits
-    if keys.kind == "mesh":
-        look: Look = "unshaded" if "unlit" in field.can else "shaded"
-        render = partial(composed.render, edits=edits, look=look, outputs=(field.depth,))
-        return _write_fused(path, keys, scene.framed(composed), render, scene.space)
     if isinstance(composed, JoinedGaussians):
         return write_gaussians(path, composed.with_edits(edits), facts)
     return _write(path, keys, join_surfels(cast(Composition, composed).parts, edits), scene.space)
 
 
+def export_surface(path: Path, scene: Scene, keys: Export) -> list[str]:
+    """Export the surface of a scene, or of its one model without edits, fused from views; return notes."""
+    kind, device = files.kind_of(next(iter(scene.models.values())).file), torch_device(keys.device)
+    has_light = "unlit" not in kind.can
+    if keys.model is None:
+        composed = scene.open(device)
+        look: Look = "shaded" if has_light else "unshaded"
+        frame, render = scene.framed(composed), partial(composed.render, edits=scene.edits, look=look)
+    else:
+        model = scene.models[keys.model].open()[0].to(device)
+        frame, render = bounds_of([model]), partial(model.render)
+        has_light = not isinstance(model, Surfels) or model.stage == "surfels"
+        if isinstance(model, Surfels) and not has_light:
+            render = partial(Composition([model]).render, look="unshaded")
+    show = partial(render, outputs=(kind.depth,), background=torch.zeros(3, device=device))
+    views, space, facts = views_of(keys, frame), target_of(keys, scene.space), facts_of(keys, scene.space)
+    seen = depth_views(show, views)
+    mesh = fuse(seen, keys.voxel)
+    if keys.kind == "mesh":
+        write_mesh(path, mesh if space is None else place_mesh(mesh, space), facts)
+        return []
+    baked = textured(mesh, seen, 3 * keys.voxel, keys.faces, keys.texture)
+    placed = baked if space is None else baked.placed(space)
+    if path.suffix == ".obj":
+        write_obj(path, placed, facts)
+    else:
+        write_glb(path, placed, has_light=has_light, told=facts)
+    around = spiral(TEST_VIEWS, frame.lens().square(keys.size))
+    return notes_on(baked, show, [camera.to(device) for camera in around])
+
+
 def export_model(path: Path, model: Field, keys: Export, known: Space | None = None) -> Path:
     """Export one model with everything the file format can hold."""
     model = model.to(torch_device(keys.device))
-    if keys.kind == "mesh":
-        render, output = model.render, kinds()[model.kind].depth
-        if isinstance(model, Surfels) and model.stage != "surfels":
-            render = partial(Composition([model]).render, look="unshaded")
-        return _write_fused(path, keys, bounds_of([model]), partial(render, outputs=(output,)), known)
     if isinstance(model, Gaussians):
         return write_gaussians(path, model, facts_of(keys, known))
     return _write(path, keys, cast(Surfels, model), known)
@@ -169,16 +194,6 @@ def _write(path: Path, keys: Export, model: Surfels, known: Space | None) -> Pat
     if keys.kind == "vtp":
         return write_vtp(path, plain, target_of(keys, known), facts)
     return _write_points(path, plain, keys, known)
-
-
-def _write_fused(
-    path: Path, keys: Export, frame: Frame, render: Callable[..., Render], known: Space | None
-) -> Path:
-    """Write the mesh fused from renders of the whole frame."""
-    cameras, space = views_of(keys, frame), target_of(keys, known)
-    show = partial(render, background=torch.zeros(3, device=cameras[0].K.device))
-    mesh = fuse(depth_views(show, cameras), keys.voxel)
-    return write_mesh(path, mesh if space is None else place_mesh(mesh, space), facts_of(keys, known))
 
 
 def _write_points(path: Path, model: Surfels, keys: Export, known: Space | None) -> Path:

@@ -1,4 +1,4 @@
-"""Binary glTF files: a mesh of points for each model, with the extension KHR_gaussian_splatting."""
+"""Binary glTF files; for splats a mesh of points for each model, with KHR_gaussian_splatting."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,48 @@ EXTENSION = "KHR_gaussian_splatting"
 # Colours are as on a screen: pictures of texgs have no gamma of their own either.
 KERNEL = {"kernel": "ellipse", "colorSpace": "srgb_rec709_display"}
 POINTS, FLOAT, VERTICES = 0, 5126, 34962  # a mode, a type of numbers and a target in glTF
-TYPES = {(): "SCALAR", (3,): "VEC3", (4,): "VEC4"}
+TYPES = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3", (4,): "VEC4"}
+
+
+class Glb:
+    """A GLB container that is filled: its data, and what glTF says of them."""
+
+    def __init__(self) -> None:
+        self.data = bytearray()
+        self.out: dict[str, list[Any]] = {"accessors": [], "bufferViews": []}
+
+    def add(self, packed: bytes, **about: int) -> int:
+        """Add data, and return the number of their view."""
+        start, gap = len(self.data), -len(packed) % 4
+        self.out["bufferViews"].append({"buffer": 0, "byteOffset": start, "byteLength": len(packed), **about})
+        self.data += packed + bytes(gap)
+        return len(self.out["bufferViews"]) - 1
+
+    def attributes(self, values: Mapping[str, np.ndarray]) -> dict[str, int]:
+        """Add attributes of vertices [N] or [N, C] by name, and return the numbers of their accessors."""
+        places = {}
+        for name, rows in values.items():
+            view = self.add(rows.astype("<f4").tobytes(), target=VERTICES)
+            kind = {"componentType": FLOAT, "type": TYPES[rows.shape[1:]], "count": len(rows)}
+            ends = {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+            places[name] = len(self.out["accessors"])
+            bounds = ends if name == "POSITION" else {}
+            self.out["accessors"].append({"bufferView": view, **kind, **bounds})
+        return places
+
+    def write(self, path: str | Path, told: Told, description: Mapping[str, Any]) -> Path:
+        """Create or replace the file in one step; it shows all nodes of the description."""
+        whole = {
+            "asset": {"version": "2.0", "generator": "texgs", **({"extras": {**told}} if told else {})},
+            "scene": 0,
+            "scenes": [{"nodes": [*range(len(description["nodes"]))]}],
+            "buffers": [{"byteLength": len(self.data)}],
+        }
+        text = json.dumps({**whole, **description, **self.out}, allow_nan=False).encode()
+        text += b" " * (-len(text) % 4)
+        parts = ((b"JSON", text), (b"BIN\0", self.data))
+        chunks = [pack("<I4s", len(chunk), kind) + chunk for kind, chunk in parts]
+        return write_bytes(path, pack("<4sII", b"glTF", 2, 12 + sum(map(len, chunks))) + b"".join(chunks))
 
 
 def write_gltf(path: str | Path, clouds: Sequence[Cloud], told: Told = None) -> Path:
@@ -28,31 +69,14 @@ def write_gltf(path: str | Path, clouds: Sequence[Cloud], told: Told = None) -> 
     kernel `ellipse` of KHR_gaussian_splatting as ratified in 2026: scales and opacities are linear,
     quaternions xyzw.
     """
-    data = bytearray()
-    out: dict[str, list[Any]] = {name: [] for name in ("nodes", "meshes", "accessors", "bufferViews")}
-    for cloud in clouds:
-        places = {}
-        for name, values in _attributes(cloud).items():
-            packed = values.astype("<f4").tobytes()
-            view = {"buffer": 0, "byteOffset": len(data), "byteLength": len(packed), "target": VERTICES}
-            kind = {"componentType": FLOAT, "type": TYPES[values.shape[1:]], "count": len(values)}
-            low, high = values.min(axis=0), values.max(axis=0)
-            bounds = {"min": low.tolist(), "max": high.tolist()} if name == "POSITION" else {}
-            places[name] = len(out["accessors"])
-            out["accessors"].append({"bufferView": len(out["bufferViews"]), **kind, **bounds})
-            out["bufferViews"].append(view)
-            data += packed
+    glb = Glb()
+    nodes, meshes = list[Any](), list[Any]()
+    for index, cloud in enumerate(clouds):
+        places = glb.attributes(_attributes(cloud))
         primitive = {"mode": POINTS, "attributes": places, "extensions": {EXTENSION: KERNEL}}
-        out["nodes"].append({"name": cloud.name, "mesh": len(out["meshes"])})
-        out["meshes"].append({"name": cloud.name, "primitives": [primitive]})
-    description = {
-        "asset": {"version": "2.0", "generator": "texgs", **({"extras": {**told}} if told else {})},
-        "extensionsUsed": [EXTENSION],
-        "scene": 0,
-        "scenes": [{"nodes": [*range(len(clouds))]}],
-        "buffers": [{"byteLength": len(data)}],
-    }
-    return write_bytes(path, _binary(description | out, bytes(data)))
+        nodes.append({"name": cloud.name, "mesh": index})
+        meshes.append({"name": cloud.name, "primitives": [primitive]})
+    return glb.write(path, told, {"extensionsUsed": [EXTENSION], "nodes": nodes, "meshes": meshes})
 
 
 def _attributes(cloud: Cloud) -> dict[str, np.ndarray]:
@@ -66,11 +90,3 @@ def _attributes(cloud: Cloud) -> dict[str, np.ndarray]:
         degree = isqrt(index)
         splats[f"SH_DEGREE_{degree}_COEF_{index - degree**2}"] = cloud.sh[:, index]
     return points | {f"{EXTENSION}:{name}": values for name, values in splats.items()}
-
-
-def _binary(description: Mapping[str, object], data: bytes) -> bytes:
-    """Return a GLB container: a header, the description and the data, whose length is a multiple of 4."""
-    text = json.dumps(description, allow_nan=False).encode()
-    text += b" " * (-len(text) % 4)
-    chunks = [pack("<I4s", len(chunk), kind) + chunk for kind, chunk in ((b"JSON", text), (b"BIN\0", data))]
-    return pack("<4sII", b"glTF", 2, 12 + sum(map(len, chunks))) + b"".join(chunks)

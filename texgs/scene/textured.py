@@ -1,13 +1,14 @@
 """A mesh with a texture: surfaces with the colours that views of a scene have of them.
 
 Each triangle has half of a square of the texture. Squares have sides of powers of two and lie along a
-Z-curve, large ones first: that leaves no gaps.
+Z-curve, large ones first: that leaves no gaps. Those of a size follow a Z-curve in space, too: a viewer that
+draws small triangles reads beyond their edges, where it then finds much the same colours.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -16,7 +17,8 @@ from torch import Tensor
 from torch.nn.functional import normalize, pad
 
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, DeviceError
+from texgs.core.geometry import z_order_of
 from texgs.core.progress import progress
 from texgs.raster import Render
 from texgs.raster.fusion import DepthView
@@ -33,17 +35,20 @@ CHUNK = 2**20  # texels at a time
 class Textured(NamedTuple):
     """Triangles with a texture."""
 
-    corners: np.ndarray  # [F, 3, 3] counter-clockwise seen from outside
-    normals: np.ndarray  # [F, 3, 3] of vertices
+    vertices: np.ndarray  # [V, 3] float32
+    normals: np.ndarray  # [V, 3] of length 1
+    triangles: np.ndarray  # [F, 3] vertices, counter-clockwise seen from outside
     uv: np.ndarray  # [F, 3, 2] columns and rows from the top left, in (0, 1)
     picture: np.ndarray  # [S, S, 3] uint8
-    is_closed: bool
+    open_edges: int  # of one triangle or more than two; a closed surface has none
 
     def placed(self, space: Space) -> Textured:
-        """Map it from the world to a space."""
+        """Map it from the world to a space; triangles stay counter-clockwise."""
+        places, normals = space.points(self.vertices).astype(np.float32), self.normals @ space.turn.T
         order = slice(None, None, -1 if space.is_mirrored else 1)
-        places, normals = space.points(self.corners), self.normals @ space.turn.T
-        return Textured(places[:, order], normals[:, order], self.uv[:, order], *self[3:])
+        return self._replace(
+            vertices=places, normals=normals, triangles=self.triangles[:, order], uv=self.uv[:, order]
+        )
 
     def png(self) -> bytes:
         """Return the texture as a PNG file."""
@@ -69,19 +74,21 @@ def textured(mesh: Mesh, views: Sequence[DepthView], tolerance: float, faces: in
     surface = pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.triangles)
     surface = surface.decimate(1 - faces / surface.n_cells) if surface.n_cells > faces else surface
     surface = surface.compute_normals(cell_normals=False, split_vertices=False, consistent_normals=False)
-    triangles, uv, owner = unwrap(surface.points, surface.regular_faces, side)
-    colors = mesh.colors[KDTree(mesh.vertices).query(surface.points)[1]]  # type: ignore[index]
-    corners = [x[triangles].astype(np.float32) for x in (surface.points, surface["Normals"], colors)]
-    picture, used = np.zeros((side**2, 3), np.uint8), np.flatnonzero(owner >= 0)
-    for texels in progress(np.array_split(used, len(used) // CHUNK + 1), title="bake", unit="patch"):
+    vertices, normals = surface.points.astype(np.float32), surface["Normals"]
+    triangles, uv, owner = unwrap(vertices, surface.regular_faces, side)
+    colors = mesh.colors[KDTree(mesh.vertices).query(vertices)[1]]  # type: ignore[index]
+    corners = [x[triangles].astype(np.float32) for x in (vertices, normals, colors)]
+    picture, used = np.zeros((side, side, 3), np.uint8), np.flatnonzero(owner >= 0)
+    for texels in progress(np.array_split(used, len(used) // CHUNK + 1), title="bake", unit="block"):
         own, middle = owner[texels], np.stack([texels % side, texels // side], axis=1) + 0.5
         legs = uv[own, 1, :1] - uv[own, 0, :1]  # negative in the second half of a square
         inside = ((middle - uv[own, 0]) / legs).clip(0)  # padding has what is nearest in the triangle
         inside /= inside.sum(axis=1, keepdims=True).clip(1)
         weights = np.column_stack([1 - inside.sum(axis=1), inside]).astype(np.float32)
-        at = (torch.from_numpy(np.einsum("tk,tkc->tc", weights, x[own])) for x in corners)
-        picture[texels] = seen_colors(*at, views, tolerance).numpy()
-    return Textured(*corners[:2], uv / side, picture.reshape(side, side, 3), not surface.n_open_edges)
+        at, ahead, own_colors = (torch.from_numpy(np.einsum("tk,tkc->tc", weights, x[own])) for x in corners)
+        shown = seen_colors(at, ahead, own_colors, views, tolerance)
+        picture.reshape(-1, 3)[texels] = shown.numpy()
+    return Textured(vertices, normals, triangles, uv / side, picture, surface.n_open_edges)
 
 
 def unwrap(vertices: np.ndarray, triangles: np.ndarray, side: int) -> tuple[np.ndarray, ...]:
@@ -103,15 +110,16 @@ def unwrap(vertices: np.ndarray, triangles: np.ndarray, side: int) -> tuple[np.n
     if len(triangles) > most:
         raise ArgumentError(f"faces: expected {most} at most in a texture of {side} texels; enlarge texture")
     edges = np.linalg.norm(vertices[triangles[:, [1, 2, 0]]] - vertices[triangles[:, [2, 0, 1]]], axis=2)
-    legs = np.sort(edges, axis=1)[:, 1]
-    order = np.argsort(-legs, kind="stable")
-    turned = (edges[order].argmax(axis=1)[:, None] + np.arange(3)) % 3
-    half, texel = np.arange(len(order)) % 2, max(float(np.linalg.norm(legs)) / side, 1e-9)
+    legs, texel = np.sort(edges, axis=1)[:, 1], max(float(np.linalg.norm(edges)) / (2 * side), 1e-9)
+    rank = z_order_of(torch.from_numpy(vertices[triangles].mean(axis=1))).argsort().numpy()
     while True:
-        sides = 2 ** np.ceil(np.log2(np.maximum(legs[order[::2]] / texel + PADDING, LEAST))).astype(int)
+        own = 2 ** np.ceil(np.log2(np.maximum(legs / texel + PADDING, LEAST))).astype(int)
+        order = np.lexsort((rank, -own))
+        sides = own[order[::2]]
         if np.square(sides).sum() <= side**2:
             break
         texel *= 1.02
+    turned, half = (edges[order].argmax(axis=1)[:, None] + np.arange(3)) % 3, np.arange(len(order)) % 2
     codes, bits = (np.square(sides).cumsum() - np.square(sides)) // LEAST**2, np.arange(16)
     places = [LEAST * ((codes[:, None] >> (2 * bits + axis) & 1) << bits).sum(axis=1) for axis in (0, 1)]
     first, own = np.stack(places, axis=1), np.repeat(sides, 2)[: len(order), None, None]
@@ -147,12 +155,24 @@ def seen_colors(
     return (total[:, :3] / total[:, 3:]).round().to(torch.uint8)
 
 
+def notes_on(model: Textured, render: Callable[[Camera], Render], cameras: Sequence[Camera]) -> list[str]:
+    """Say in sentences whether a textured mesh is closed, and how far it is from its scene."""
+    count = f"{len(model.triangles):,} triangles"
+    closed = f"not closed: {model.open_edges:,} edges are open" if model.open_edges else "closed"
+    try:
+        level, lost = deviation(model, render, cameras)
+    except DeviceError as error:
+        return [f"{count}, {closed}; how far it is from the scene is not known: {error}"]
+    lacks = f"{100 * lost:.1f} % of the opacity is where it has no surface"
+    return [f"{count}, {closed}; {level:.1f} dB from the scene in {len(cameras)} views, and {lacks}"]
+
+
 def deviation(
     model: Textured, render: Callable[[Camera], Render], cameras: Sequence[Camera]
 ) -> tuple[float, float]:
-    """Return the PSNR over white of a textured mesh on what it or a scene shows, dB, and the share it lacks.
+    """Return the PSNR of a textured mesh on what it or its scene shows, dB, and the share that it lacks.
 
-    The mesh is drawn by VTK without light. The share is that of the scene's opacity in all pixels.
+    The mesh is drawn by VTK, without light, over white. The share is that of the scene's opacity.
 
     Raises:
         DeviceError: if there is no OpenGL.
@@ -163,10 +183,11 @@ def deviation(
     from texgs.volume.vtk_renderer import aim
 
     offscreen_opengl()
-    numbers = np.arange(model.corners.size // 3).reshape(-1, 3)
-    surface = pyvista.PolyData.from_regular_faces(model.corners.reshape(-1, 3), numbers)
+    numbers: Any = np.arange(model.triangles.size).reshape(-1, 3)
+    surface = pyvista.PolyData.from_regular_faces(model.vertices[model.triangles].reshape(-1, 3), numbers)
     surface.active_texture_coordinates = (model.uv * [1, -1] + [0, 1]).reshape(-1, 2).astype(np.float32)
-    plotter = pyvista.Plotter(off_screen=True, lighting="none")
+    plotter: Any = pyvista.Plotter(off_screen=True, lighting="none")
+    plotter.ren_win.SetMultiSamples(0)
     texture = pyvista.Texture(model.picture)
     texture.interpolate = True
     plotter.add_mesh(surface, texture=texture, lighting=False)

@@ -46,7 +46,8 @@ def write_download(
     require_kind(scene, asked.kind)
     kind, volume = ("html", PAGE_VOLUME) if asked.kind == "volume" else (asked.kind, None)
     ending = EXPORTS.get(kind, [f".{kind}"])[0]
-    path = folder / (f"{name}-{kind}{ending}" if ending == ".ply" else f"{name}{ending}")  # kinds share .ply
+    is_told = ending == ".ply" or kind == "textured"  # others have the same ending
+    path = folder / (f"{name}-{kind}{ending}" if is_told else f"{name}{ending}")
     if kind in FILMS:
         for name in {name for key in asked.keys for name in key}:  # no page opens files of its choice
             require_keys({name.rpartition(".")[2]: None}, (*KEPT, *SCENE_KEYS, *EDIT_KEYS), "keys")

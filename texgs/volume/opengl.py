@@ -1,5 +1,6 @@
 """Offscreen OpenGL, tried in a child process: incomplete drivers crash VTK."""
 
+import os
 import subprocess
 import sys
 
@@ -12,7 +13,8 @@ ADVICE = (
 
 
 def offscreen_opengl() -> str:
-    """Return the name of the offscreen renderer, such as a GPU."""
+    """Return the name of the offscreen renderer, such as a GPU; choose it for this process, too."""
+    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")  # asks no X server
     command = [sys.executable, "-P", "-m", "texgs.volume.opengl"]
     try:
         child = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)

@@ -3,7 +3,6 @@
 Its shading is Phong's, with a viewer nearby: highlights differ from those of `texgs.volume.caster`.
 """
 
-import os
 from copy import copy
 from dataclasses import replace
 from math import atan, degrees
@@ -36,7 +35,6 @@ class VtkRenderer:
     local_viewer = True
 
     def __init__(self, grid: Grid, appearance: Appearance) -> None:
-        os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")  # asks no X server
         offscreen_opengl()
         image, self._factor = image_data(grid)
         low, high = image.GetScalarRange()

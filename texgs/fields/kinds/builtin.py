@@ -1,5 +1,6 @@
 """The kinds of field of texgs. All but surfels have baked light; edits change only their opacity."""
 
+from texgs.core.names import EXPORTS
 from texgs.fields.kinds import ALL, Kind
 
 FIELD = (
@@ -11,7 +12,7 @@ FIELD = (
         "texgs.fields.gaussians:read_gaussians",
         "texgs.fields.gaussians:write_gaussians",
         "texgs.fields.gaussians:JoinedGaussians",
-        exports=("3dgs", "mesh", "usd", "gltf", "spz"),
+        exports=("3dgs", "mesh", "textured", "usd", "gltf", "spz"),
         depth="depth",  # the mean, as the authors of 2DGS take it of 3D Gaussians
     ),
     # Small networks whose colours are mixtures of a palette: what StyleRF-VolVis builds on.
@@ -22,7 +23,7 @@ FIELD = (
         "texgs.fields.palette.model:read_palette",
         "texgs.fields.palette.model:write_palette",
         "texgs.fields.palette.model:PaletteScene",
-        exports=("mesh",),
+        exports=("mesh", "textured"),
         depth="depth",  # the mean
         film_size=128,
     ),
@@ -34,7 +35,7 @@ FIELD = (
         "texgs.fields.surfels.compact:open_model",
         "texgs.fields.surfels.model_file:write_model",
         "texgs.fields.surfels.composition:Composition",
-        exports=("3dgs", "2dgs", "release", "points", "mesh", "compact", "html", "usd", "gltf", "spz", "vtp"),
+        exports=tuple(EXPORTS),
         depth="median",
     ),
     # Sparse grids of voxels (Fridovich-Keil et al. 2022): what ARF and Instruct-NeRF2NeRF build on.
@@ -45,7 +46,7 @@ FIELD = (
         "texgs.fields.voxels:read_voxels",
         "texgs.fields.voxels:write_voxels",
         "texgs.fields.voxels:VoxelScene",
-        exports=("mesh",),
+        exports=("mesh", "textured"),
         depth="depth",  # the mean
     ),
 )

@@ -9,7 +9,7 @@ import { PictureDialog } from "./size_inputs.js";
 const EXPORTS = {
   mp4: "Film, MP4", gif: "Film, GIF", keys: "Keys of a film, YAML",
   html: "Web page", volume: "Web page with the volume, 2 MB more",
-  "3dgs": "3D Gaussians, PLY", "2dgs": "2D Gaussians, PLY", points: "Points, PLY", mesh: "Mesh, PLY",
+  "3dgs": "3D Gaussians, PLY", "2dgs": "2D Gaussians, PLY", points: "Points, PLY", mesh: "Mesh, PLY", textured: "Mesh with a texture, glTF",
   usd: "Splats with light, OpenUSD", gltf: "Splats with light, glTF", spz: "Splats with light, SPZ", vtp: "Surfels as polygons, VTK",
 };
 const get = (id) => document.getElementById(id);
