@@ -9,14 +9,17 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import pytest
 from snakemake.api import SnakemakeApi
 from snakemake.cli import parse_config
+from snakemake_interface_logger_plugins.common import LogEvent
 
 from tests.refusals import refused
 from tests.workflow.project import TINY
 from texgs.cli.run import WORD, snakemake
+from texgs.cli.run_log import LogHandler
 from texgs.cli.snakemake import last_line, overrides, place_errors
 from texgs.core.errors import ArgumentError
 
@@ -263,6 +266,29 @@ def test_without_a_terminal_there_are_plain_lines_and_errors_in_whole(runs):
     assert "\x1b" not in plain.stderr
     assert "rule transfer:" in verbose.stderr
     assert "1 of 2 steps" not in plain.stderr
+
+
+@pytest.mark.workflow
+def test_a_profile_decides_on_the_log_too(runs):
+    _, _, folder, words = runs
+    profile = folder / "silent"
+    profile.mkdir()
+    (profile / "profile.yaml").write_text("quiet: [all]\n")
+    done = texgs(folder, *words, "--profile", str(profile))
+    assert done.returncode == 1
+    assert "started" not in done.stderr
+
+
+def test_what_a_cluster_says_of_a_failed_job_is_told(tmp_path, capsys):
+    """A job that is killed has nothing in its log."""
+    handler, log = LogHandler(SimpleNamespace(), None), tmp_path / "phase.log"
+    handler._jobs[7] = SimpleNamespace(rule_name="phase", wildcards={"tf": "TF01"})
+    record = SimpleNamespace(
+        event=LogEvent.JOB_ERROR, jobid=7, log=[str(log)], rule_msg="SLURM: OUT_OF_MEMORY"
+    )
+    handler.emit(record)
+    lines = [line.split() for line in capsys.readouterr().err.splitlines()]
+    assert lines == [["failed", "phase", "TF01", "see", str(log)], ["SLURM:", "OUT_OF_MEMORY"]]
 
 
 @pytest.mark.workflow

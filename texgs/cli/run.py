@@ -81,8 +81,10 @@ def snakemake(words: Sequence[str]) -> bool:
     options.targets = targets
     options.config = [*(options.config or ()), *overrides(chosen, options.config or ())]
     sys.argv = ["snakemake", *rest]  # the Snakefile looks there
+    is_quiet = given.quiet or "all" in map(str, options.quiet or ())  # profiles of texgs are so in parts
+    asked = (is_quiet, options.verbose, options.dryrun, options.logger, options.printshellcmds)
     options.verbose = False  # it asks for Snakemake's log, whose own `verbose` is for its developers
-    return execute(options, own_log=not (given.verbose or given.dryrun or given.quiet or given.logger))
+    return execute(options, own_log=not any(asked))
 
 
 def require_composed(words: Sequence[str]) -> None:

@@ -57,7 +57,8 @@ class LogHandler(LogHandlerBase):
                 self._done += 1
                 say(f"{self._done} of {self._total}", title(job), outcome(job))
             elif event == LogEvent.JOB_ERROR and (job := self._jobs.pop(record.jobid, None)):
-                say("failed", title(job), f"see {' '.join(record.log)}\n{BARS.sub('', text_of(record))}")
+                told = f"{record.rule_msg or ''}\n{BARS.sub('', text_of(record))}".lstrip()
+                say("failed", title(job), f"see {' '.join(record.log)}\n{told}")
             elif event in (None, LogEvent.ERROR) and not re.match(OF_NO_USE, record.getMessage()):
                 say("", record.getMessage())
 
