@@ -105,6 +105,13 @@ def test_numbers_stay_between_their_keys_and_angles_go_the_short_way(tmp_path_fa
             assert (steps >= -1e-6).all() or (steps <= 1e-6).all()
 
 
+def test_a_film_turns_from_the_azimuth_that_a_scene_begins_with(scene):
+    """Where the first key names none."""
+    framed = replace(scene, frame=replace(scene.framed(scene.open()), azimuth=10.0))
+    seen = [shot.azimuth for shot, _ in through(framed, {"seconds": 0.2}, {"azimuth": 50})]
+    assert seen == pytest.approx([10, 30, 50])
+
+
 def test_colours_go_straight_through_oklab_from_the_fitted_one(scene):
     """And so does the background."""
     keys = ({"seconds": 1}, {"low.palette": "#00ff00", "background": "#000000"})

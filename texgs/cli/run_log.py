@@ -71,7 +71,8 @@ class LogHandler(LogHandlerBase):
         narrow = (Column(no_wrap=True) for _ in range(3))
         table = Table.grid(*narrow, Column(overflow="ellipsis"), padding=(0, 2))
         rows = [("all jobs", self._start, f": {self._done} of {self._total} jobs")]
-        rows += [(title(job), job.created, text_of(job)) for job in list(self._jobs.values())]
+        at_work = [job for job in list(self._jobs.values()) if job.local]
+        rows += [(title(job), job.created, text_of(job)) for job in at_work]
         for name, start, text in rows:
             last = text.rstrip().rpartition("\n")[2]
             count = re.search(r": (\d+) of (\d+) ", last)

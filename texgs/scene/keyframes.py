@@ -77,7 +77,12 @@ def keyed_shots(keys: Sequence[Key], scene: Scene, composed: Composed) -> Iterat
             framed = session.scene.frame or session.scene.framed(session.composition)
             each.camera(framed)
         lens: Any = each.lens(framed)
-        stops[each.at] = replace(each, radius=lens.radius, target=tuple(lens.target), words=()), session.scene
+        seen = {
+            "azimuth": framed.azimuth if each.azimuth is None else each.azimuth,
+            "radius": lens.radius,
+            "target": tuple(lens.target),
+        }
+        stops[each.at] = replace(each, **seen, words=()), session.scene
     return between(stops)
 
 
