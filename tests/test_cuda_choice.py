@@ -16,10 +16,10 @@ pytestmark = [
 ]
 
 
-def configured(folder, listed, *options):
-    """What the cache and the build files say where nvidia-smi lists this."""
+def configured(folder, listed, *options, status=0):
+    """What the cache and the build files say where nvidia-smi lists this, and ends with a status."""
     smi = folder / "nvidia-smi"
-    smi.write_text(f"#!/bin/sh\nprintf '{listed}'\n")
+    smi.write_text(f"#!/bin/sh\nprintf '{listed}'\nexit {status}\n")
     smi.chmod(0o755)
     command = ["cmake", "-S", ROOT, "-B", folder / "build", f"-DPython_EXECUTABLE={sys.executable}"]
     command += ["-DCMAKE_EXPORT_COMPILE_COMMANDS=ON", "-DTEXGS_IN_PLACE=OFF", *options]
@@ -33,6 +33,12 @@ def configured(folder, listed, *options):
 
 def test_no_gpu_no_cuda(tmp_path):
     left_out, codes = configured(tmp_path, "")
+    assert left_out == "nvidia-smi lists no GPU of compute capability 8.0 or newer"
+    assert not codes
+
+
+def test_a_driver_that_does_not_work_is_no_gpu(tmp_path):
+    left_out, codes = configured(tmp_path, "NVML library version: 535.161\n", status=18)
     assert left_out == "nvidia-smi lists no GPU of compute capability 8.0 or newer"
     assert not codes
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -110,6 +111,20 @@ def test_a_film_turns_from_the_azimuth_that_a_scene_begins_with(scene):
     framed = replace(scene, frame=replace(scene.framed(scene.open()), azimuth=10.0))
     seen = [shot.azimuth for shot, _ in through(framed, {"seconds": 0.2}, {"azimuth": 50})]
     assert seen == pytest.approx([10, 30, 50])
+
+
+def test_texts_of_markers_are_those_of_the_keys(scene):
+    markers = [{"points": [[0, 0, 0]], "text": "heiß 😀"}]
+    _, (_, shown) = through(scene, {"seconds": 0.1}, {"markers": markers})
+    assert [each.text for each in shown.markers] == ["heiß 😀"]
+
+
+@pytest.mark.parametrize("kind", [str, Path])
+def test_keys_are_of_a_file_or_a_sequence(tmp_path, kind):
+    (tmp_path / "k.yaml").write_text("- azimuth: 3\n- azimuth: 4\n")
+    given = Film(keys=kind(tmp_path / "k.yaml")).keys, Film(keys=({"azimuth": 3}, {"azimuth": 4})).keys
+    assert [[each.azimuth for each in keys] for keys in given] == [[3, 4], [3, 4]]
+    refused(lambda: Film(keys=[{}, {}], what="orbit"), "film: expected keys or a path, got keys and orbit")
 
 
 def test_colours_go_straight_through_oklab_from_the_fitted_one(scene):
@@ -224,7 +239,7 @@ def test_a_film_through_keys_has_its_own_length_and_movement(tmp_path, capsys):
         "--output",
     ]
     assert main([*words, str(tmp_path / "x"), "--path", "orbit"]) == 2
-    assert "--film: expected no --path" in capsys.readouterr().err
+    assert "film: expected keys or a path, got keys and orbit" in capsys.readouterr().err
     assert main([*words, str(tmp_path / "x.gif")]) == 0
     texgs.open(scene).film(tmp_path / "y.gif", keys=keys, width=32, fps=2)
     assert (tmp_path / "x.gif").read_bytes() == (tmp_path / "y.gif").read_bytes()

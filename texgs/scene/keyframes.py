@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -39,11 +40,12 @@ class Key(Shot):
 
 def read_keys(keys: Any, start: Shot, fps: float) -> list[Key]:
     """Return the keys of a file or a list, two or more; what the first does not name is that of a shot."""
-    rows, file = keys, keys if isinstance(keys, str) else "keys"
-    if isinstance(keys, str):
+    is_file = isinstance(keys, str | Path)
+    rows, file = keys, str(keys) if is_file else "keys"
+    if is_file:
         with reading(keys, "keyframes in YAML", "correct it") as path, errors_at(path):
             rows = parse_yaml(path.read_text(encoding="utf-8"))
-    if not isinstance(rows, list) or len(rows) < 2:
+    if not isinstance(rows, list | tuple) or len(rows) < 2:
         raise ArgumentError(f"{file}: expected a list of two keys or more, got {rows!r:.60}")
     made, values = list[Key](), {each.name: getattr(start, each.name) for each in fields(Shot)}
     for number, row in enumerate(rows, 1):
@@ -52,7 +54,10 @@ def read_keys(keys: Any, start: Shot, fps: float) -> list[Key]:
             of_parts = (str(name) for name in row if {*"./"} & {*str(name)})
             require_keys(row, (*KEPT, "cut", *PLACES, *SCENE_KEYS, *of_parts), "a key")
             values |= {name: row[name] for name in KEPT if name in row} | {"where": where}
-            texts = {name: x if isinstance(x, str) else json.dumps(x, default=str) for name, x in row.items()}
+            texts = {
+                name: x if isinstance(x, str) else json.dumps(x, default=str, ensure_ascii=False)
+                for name, x in row.items()
+            }
             values["words"] = [f"{n}={'' if x == 'null' else x}" for n, x in texts.items() if n not in KEPT]
             values["at"] = made[-1].at + max(1, round(made[-1].seconds * fps)) if made else 0
             made.append(typed_argument(Key, values))

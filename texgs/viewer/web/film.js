@@ -53,8 +53,8 @@ export class FilmInputs {
   /** Keys as `texgs render --film` has them, evenly over all frames; edits are those since the key before. */
   get #keys() {
     const { camera, shown, state, bookmarks } = this.#page, fps = this.#fps.input.valueAsNumber;
-    const count = Math.max(2, Math.round(this.#seconds.input.valueAsNumber * fps)), way = this.#way.value;
-    const stops = way === "turn" ? Array(TURN).fill({ pose: camera.pose }) : bookmarks.kept;
+    const way = this.#way.value, stops = way === "turn" ? Array(TURN).fill({ pose: camera.pose }) : bookmarks.kept;
+    const count = Math.max(stops.length, Math.round(this.#seconds.input.valueAsNumber * fps)); // one a key at least
     const at = stops.map((_, i) => Math.round(i * (count - 1) / (stops.length - 1)));
     let before = shown.before ? state.original : state.scene;
     return stops.map(({ pose: { azimuth, polar, distance: radius, fov_y, target }, scene }, i) => {
