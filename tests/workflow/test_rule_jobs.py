@@ -1,6 +1,7 @@
 """What rules ask of a plan."""
 
 import subprocess
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -51,3 +52,13 @@ def test_commands_have_the_environment_of_jobs_and_go_on_without_a_reader(tmp_pa
         assert done.returncode == 0
         assert (tmp_path / "log").read_text() == "a 'b' c d e\n"
         assert bool(done.stdout) == (is_shown and not end)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize("is_shown", [True, False])
+def test_a_job_goes_on_where_its_log_cannot_be_written(tmp_path, is_shown):
+    (tmp_path / "client.py").write_text("for _ in range(20000): print('a line')\nopen('end', 'w')")
+    command = f"{shell_prefix({}, 'client.py', is_shown=is_shown).format()} texgs | tee /dev/full"
+    done = subprocess.run(["bash", "-c", command], cwd=tmp_path, check=False, capture_output=True)
+    assert done.returncode == 0
+    assert (tmp_path / "end").exists()

@@ -80,5 +80,5 @@ def shell_prefix(environment: Mapping[str, str], client: str, *, is_shown: bool)
     """
     setting = " ".join(f"{name}={shlex.quote(value)}" for name, value in environment.items())
     program = f"{setting} {shlex.quote(sys.executable)} -PSE {shlex.quote(client)}"
-    tee = 'command tee "$@" || true' if is_shown else 'cat > "$1" || true'
+    tee = f'command tee "$@"{"" if is_shown else " > /dev/null"} || true'
     return f"set -euo pipefail; trap '' PIPE; tee() {{{{ {tee}; }}}}; texgs() {{{{ {program} \"$@\"; }}}}; "
