@@ -69,6 +69,7 @@ lint: $(VENV)/dependencies
 	$(BIN)/snakemake --lint
 	$(BIN)/python -m pytest tests/test_layers.py
 
+$(if $(filter-out 0 1,$(CUDA)),$(error CUDA: expected 1 to compile the CUDA library or 0 not to, got $(CUDA)))
 # CMake writes into the source tree, and remembers its options; pip has only to find what is there.
 CONFIGURE = $(BIN)/cmake -S . -B build/editable -G Ninja -DCMAKE_MAKE_PROGRAM=$(abspath $(BIN)/ninja) \
 	-DPython_EXECUTABLE=$(abspath $(BIN)/python) --log-level=WARNING \

@@ -4,7 +4,7 @@
 # Debian 12: apt-get install g++-aarch64-linux-gnu clang qemu-user-static. What is absent is said and skipped.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-BIN=${BIN:-.venv/bin}
+BIN=$(realpath "${BIN:-.venv/bin}")
 OUT=$PWD/build/cross
 TORCH=2.9.1 # the last whose wheel for aarch64 on PyPI needs no CUDA
 # Images and gradients against the reference in float64: five minutes of a processor.
@@ -13,8 +13,8 @@ TESTS=${TESTS:-tests/raster/test_reference.py tests/raster/test_images_and_gradi
 there() { command -v "$1" > /dev/null || { echo "Skipped: no $1 on the PATH"; return 1; }; }
 
 compile() { # NAME COMPILER [OPTION...]
-    "$BIN/cmake" -S . -B "$OUT/$1" -G Ninja -DCMAKE_MAKE_PROGRAM="$PWD/$BIN/ninja" -DCMAKE_CXX_COMPILER="$2" "${@:3}" \
-        -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 -DPython_EXECUTABLE="$PWD/$BIN/python" \
+    "$BIN/cmake" -S . -B "$OUT/$1" -G Ninja -DCMAKE_MAKE_PROGRAM="$BIN/ninja" -DCMAKE_CXX_COMPILER="$2" "${@:3}" \
+        -DCMAKE_SYSTEM_NAME=Linux -DCMAKE_SYSTEM_PROCESSOR=aarch64 -DPython_EXECUTABLE="$BIN/python" \
         -DTEXGS_CUDA=OFF -DTEXGS_IN_PLACE=OFF -DTEXGS_WERROR=ON > /dev/null
     "$BIN/cmake" --build "$OUT/$1"
     echo "Compiled for aarch64 without warnings by $("$2" --version | head -1)"

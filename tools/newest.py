@@ -8,7 +8,10 @@ import re
 import subprocess
 import sys
 import tomllib
+from itertools import chain
 from pathlib import Path
+
+from lock import EXTRAS
 
 ROOT = Path(__file__).parents[1]
 LOCKS = ("requirements.lock", "requirements-torch.lock")
@@ -19,7 +22,10 @@ PINNED = re.compile(r"^([\w.-]+)==([^\s;+]+)", re.MULTILINE)
 def wanted() -> list[str]:
     """The names of all packages that texgs and its tests need."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    lines = [*project["dependencies"], *project["optional-dependencies"]["dev"]]
+    lines = [
+        *project["dependencies"],
+        *chain.from_iterable(project["optional-dependencies"][each] for each in EXTRAS),
+    ]
     return [re.split(r"[^\w-]", line)[0] for line in lines]
 
 

@@ -107,7 +107,7 @@ def test_mistakes_end_with_2(tmp_path, words, message):
     [
         ("dataset=lung fit=quick", "dataset=lung: this folder has no conf/, so it is no project: cd PROJECT"),
         ("experiment=mine -n", "experiment=mine: this folder has no conf/"),
-        ("dataset=ENGINE", "got ENGINE, did you mean engine?"),
+        ("dataset=ENGINE", "got ENGINE, did you mean engine? (this folder has no conf/, so it is no project"),
         (f"dataset={'x' * 300}", "this folder has no conf/"),
     ],
 )
@@ -289,6 +289,16 @@ def test_what_a_cluster_says_of_a_failed_job_is_told(tmp_path, capsys):
     handler.emit(record)
     lines = [line.split() for line in capsys.readouterr().err.splitlines()]
     assert lines == [["failed", "phase", "TF01", "see", str(log)], ["SLURM:", "OUT_OF_MEMORY"]]
+
+
+def test_a_line_that_cannot_be_written_ends_no_log(tmp_path, capsys):
+    """Here of a job whose numbers are cut off."""
+    handler, metrics = LogHandler(SimpleNamespace(), None), tmp_path / "metrics.json"
+    metrics.write_text("{")
+    job = SimpleNamespace(rule_name="views", wildcards={}, output=[str(metrics)], log=[], created=0)
+    handler._jobs[7] = job
+    handler.emit(SimpleNamespace(event=LogEvent.JOB_FINISHED, job_id=7, msg="", args=()))
+    assert "metrics.json" in capsys.readouterr().err
 
 
 @pytest.mark.workflow

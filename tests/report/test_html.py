@@ -227,6 +227,12 @@ def test_a_report_begins_with_pictures_and_three_sentences(tmp_path, folder):
     assert first[0] == "contents"
 
 
+def test_of_several_recipes_the_one_that_is_told_of_is_named(tmp_path, folder):
+    other = job(folder, "compose", SceneResult(2, 99), [], recipe="slow", dataset="mine", seconds=10.0)
+    told = page(tmp_path, [*own_run(folder), other]).of("p")[0]
+    assert told.endswith("as a scene of 1,234 surfels by quick.")
+
+
 def test_missing_parts_are_told_first(tmp_path, folder):
     assert (
         "Parts are missing: the scene shows 91.2 % of what is there."

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 
 from tests.refusals import refused
 from tests.scene.balls import balls_in_a_volume, shell
+from texgs.core.camera import orbit
 from texgs.core.cuts import Cuts, Plane
 from texgs.core.errors import ArgumentError
-from texgs.core.light import Light
+from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
@@ -20,6 +21,7 @@ from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.scene.exposure import absorbed, exposure_of, require_shadows
 from texgs.scene.parts import replace_entry
 from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.session import Session
 from texgs.scene.twin import Twin
 
 UP = (0.0, 1.0, 0.0)
@@ -138,3 +140,10 @@ def test_shadows_need_a_volume(tmp_path):
     scene = Scene({"a": SceneModel(tmp_path / "a.safetensors")}, FROM_ABOVE)
     refused(lambda: exposure_of(surfels(0.0), scene, None), "volume", ArgumentError)
     refused(lambda: require_shadows(scene), "volume", ArgumentError)
+
+
+@pytest.mark.parametrize("mode", ["normal", "depth", "alpha", "texture"])
+def test_modes_that_show_no_light_need_no_volume_for_shadows(scene, mode):
+    camera = orbit(30, 20, 3.0, 40.0, 24, 24)
+    lit, plain = (Session(each).frame(camera, mode) for each in (scene, replace(scene, light=HEADLIGHT)))
+    np.testing.assert_array_equal(lit, plain)

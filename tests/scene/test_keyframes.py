@@ -124,7 +124,7 @@ def test_keys_are_of_a_file_or_a_sequence(tmp_path, kind):
     (tmp_path / "k.yaml").write_text("- azimuth: 3\n- azimuth: 4\n")
     given = Film(keys=kind(tmp_path / "k.yaml")).keys, Film(keys=({"azimuth": 3}, {"azimuth": 4})).keys
     assert [[each.azimuth for each in keys] for keys in given] == [[3, 4], [3, 4]]
-    refused(lambda: Film(keys=[{}, {}], what="orbit"), "film: expected keys or a path, got keys and orbit")
+    refused(lambda: Film(keys=[{}, {}], what="light"), "film: expected keys or a path, got keys and light")
 
 
 def test_colours_go_straight_through_oklab_from_the_fitted_one(scene):
@@ -239,7 +239,7 @@ def test_a_film_through_keys_has_its_own_length_and_movement(tmp_path, capsys):
         "--output",
     ]
     assert main([*words, str(tmp_path / "x"), "--path", "orbit"]) == 2
-    assert "film: expected keys or a path, got keys and orbit" in capsys.readouterr().err
+    assert "--film: expected no --path, got orbit" in capsys.readouterr().err
     assert main([*words, str(tmp_path / "x.gif")]) == 0
     texgs.open(scene).film(tmp_path / "y.gif", keys=keys, width=32, fps=2)
     assert (tmp_path / "x.gif").read_bytes() == (tmp_path / "y.gif").read_bytes()

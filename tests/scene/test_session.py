@@ -314,7 +314,10 @@ def test_planes_have_the_numbers_of_before_all_words(session, words, left):
         ("cut.1=0,1,1,9", "along 0,0.707,0.707, got 6.36"),
         ("cut.box=4,4,4,5,5,5", "along -1,0,0, got -4"),
         ("cuts=x,0", "'cuts', did you mean cut?"),
-        ("sun=3", "'sun'; expected light, shadows, .*reach, background, time, cut, marker, distance$"),
+        (
+            "sun=3",
+            "'sun'; expected light, shadows, .*reach, background, functions, time, cut, marker, distance$",
+        ),
         ("cut.box=1,2,3", "X0,Y0,Z0,X1,Y1,Z1, .* got 1,2,3"),
         ("cut.faces=dark", "faces: .* dark"),
     ],

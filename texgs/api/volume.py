@@ -164,7 +164,7 @@ class Volume:
     def render(
         self,
         functions: AnyFunctions | None = None,
-        azimuth: float = 30.0,
+        azimuth: float | None = None,
         polar: float = 20.0,
         width: int = 800,
         height: int | None = None,
@@ -178,7 +178,7 @@ class Volume:
         Args:
             functions: transfer functions, whose extinctions add up where they overlap; default those
                 suggested.
-            azimuth: of the camera, degrees.
+            azimuth: of the camera, degrees; default 30, or a patient's front.
             polar: of the camera above the horizon, degrees.
             width: pixels.
             height: pixels; default the width.

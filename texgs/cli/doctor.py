@@ -17,12 +17,9 @@ from typing import Literal
 
 from texgs.core.cache import cache_folder, weights_folder
 from texgs.core.errors import TexgsError, first_line
+from texgs.core.native_sources import CUDA_ADVICE
 
 AGAIN = "install texgs again"
-CUDA_ADVICE = (
-    "only needed for a GPU: put nvcc (CUDA 12 or newer) on the PATH, then `make install CUDA=1`, "
-    "or `pip install . -C cmake.define.TEXGS_CUDA=ON`"
-)
 
 
 @dataclass(frozen=True)
@@ -173,10 +170,10 @@ def cuda() -> Finding:
 
         path = native.library_path("cuda")
         if not path.exists():
-            return Finding("missing", "not built", CUDA_ADVICE)
+            return Finding("missing", "not built", f"only needed for a GPU: {CUDA_ADVICE}")
         return Finding("ok", f"{native.instruction_set('cuda')}, {path}")
     except (ImportError, TexgsError) as error:
-        return Finding("missing", first_line(error), CUDA_ADVICE)
+        return Finding("missing", first_line(error), f"only needed for a GPU: {CUDA_ADVICE}")
 
 
 def opengl() -> Finding:

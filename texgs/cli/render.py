@@ -71,6 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 def require_compatible(arguments: argparse.Namespace, film: Film) -> None:
     """Refuse options that do not go together."""
+    if film.keys and film.what != "view":
+        raise ArgumentError(f"--film: expected no --path, got {film.what}; leave one of them out")
     if film.transparent and (arguments.compare or arguments.caption):
         raise ArgumentError("--transparent: expected neither --compare nor --caption; leave them out")
     if arguments.compare and film.mode != "shaded":

@@ -5,7 +5,6 @@ A logger plugin of Snakemake, which reads the logs of jobs. Those of a cluster h
 
 import re
 import sys
-from contextlib import suppress
 from pathlib import Path
 from time import time
 from typing import Any
@@ -18,6 +17,7 @@ from rich.text import Text
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
+from texgs.core.errors import TexgsError
 from texgs.core.io import read_json
 from texgs.core.names import METRICS
 from texgs.core.progress import LINE, time_text
@@ -42,9 +42,9 @@ class LogHandler(LogHandlerBase):
         self._live = Live(get_renderable=self._bars, console=console, transient=True, redirect_stdout=False)
 
     def emit(self, record: Any) -> None:
-        """Say what has happened; where nobody reads it any more, the run goes on."""
+        """Say what has happened; where it cannot be said, the run goes on, and so does its log."""
         event = getattr(record, "event", None)
-        with suppress(BrokenPipeError):
+        try:
             if event == LogEvent.RUN_INFO:
                 self._total = sum(record.stats[rule] for rule in record.stats.keys() - NO_JOBS)
             elif event == LogEvent.JOB_INFO and record.rule_name not in NO_JOBS:
@@ -61,6 +61,8 @@ class LogHandler(LogHandlerBase):
                 say("failed", title(job), f"see {' '.join(record.log)}\n{told}")
             elif event in (None, LogEvent.ERROR) and not re.match(OF_NO_USE, record.getMessage()):
                 say("", record.getMessage())
+        except (OSError, TexgsError):
+            self.handleError(record)
 
     def close(self) -> None:
         """Take the bars away."""
@@ -89,7 +91,7 @@ def say(count: str, what: str, text: str = "") -> None:
 
 def title(job: Any) -> str:
     """Return what a job does and of what, such as "shading engine/TF01/quick"."""
-    values = {key: value for key, value in job.wildcards.items() if key != "views"}
+    values = {key: value for key, value in job.wildcards.items() if (key, value) != ("views", "views")}
     return f"{values.pop('phase', job.rule_name).replace('_', ' ')} {'/'.join(values.values())}"
 
 
@@ -104,4 +106,5 @@ def outcome(job: Any) -> str:
     made = read_json(folders[0] / METRICS) if folders else {"seconds": time() - job.created, "numbers": {}}
     quality = f"{made['numbers']['psnr']:.2f} dB, " if "psnr" in made["numbers"] else ""
     said = BARS.sub("", text_of(job)) if folders else "\n".join(re.findall("(?m)^Left out: .*", text_of(job)))
-    return f"{quality}{time_text(made['seconds'])}\n{said}"
+    spent = min(made["seconds"], time() - job.created)  # what was there already took its time before
+    return f"{quality}{time_text(spent)}\n{said}"

@@ -56,9 +56,11 @@ def sentence(error: Exception) -> str:
         group, _, name = error.missing_cfg_file.partition("/")
         known = members(group)
         hint = close(name, known) or ("; an address goes to tracking.uri" if group == "tracking" else "")
-        if not hint and (outside := no_project()):
+        outside = no_project()
+        if outside and not hint:
             return f"{group}={name}: {outside}; texgs itself has {', '.join(known)}"
         hint = hint or f"; one of your own is a file, conf/{group}/{name}.yaml"
+        hint += f" ({outside})" if outside else ""
         return f"{where[0] if where else ''}{group}: expected one of {', '.join(known)}, got {name}{hint}"
     if isinstance(error, OverrideParseException):
         return (

@@ -18,6 +18,7 @@ SUFFIXES = (".h", ".cpp", ".cu", ".cuh", ".txt")
 LENGTH = 12  # hexadecimal digits
 RASTER = Path(__file__).parents[1] / "raster"  # has the sources, or the libraries that were built from them
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")  # of native libraries
+CUDA_ADVICE = "with nvcc 12 or newer: `make install CUDA=1`, or `pip install . -C cmake.define.TEXGS_CUDA=ON`"
 # Comments, which do not count; then what does: literals, words, and any other character but blanks.
 TOKENS = re.compile(
     r"""//[^\n]*|/\*.*?\*/|("(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])*'|\w+|[^\w\s])""", re.DOTALL

@@ -23,7 +23,7 @@ from torch import Tensor
 
 from texgs.core import memory
 from texgs.core.errors import ArgumentError, DeviceError, NativeError, OutOfMemoryError, Stopped
-from texgs.core.native_sources import SUFFIX, built_from, library_sources
+from texgs.core.native_sources import CUDA_ADVICE, SUFFIX, built_from, library_sources
 
 ABI_VERSION = 10
 FOLDER = Path(__file__).parent / "_native"
@@ -120,8 +120,8 @@ def library(device_type: str = "cpu") -> ctypes.CDLL:
         raise DeviceError(f"texgs.raster: expected tensors on cpu or cuda, got {device_type}; move them")
     path = library_path(device_type)
     if not path.exists():
-        hint = "install a CUDA compiler and " if device_type == "cuda" else ""
-        raise NativeError(f"{path.name}: not found in {path.parent}; {hint}{INSTALL_ADVICE}")
+        advice = CUDA_ADVICE if device_type == "cuda" else INSTALL_ADVICE
+        raise NativeError(f"{path.name}: not found in {path.parent}; {advice}")
     try:
         lib = ctypes.CDLL(str(path))
     except OSError as error:

@@ -7,6 +7,7 @@ from typing import Any
 from texgs.fields.kinds import kinds
 from texgs.metrics.metric import Measure, metrics
 from texgs.models.pictures import PICTURES
+from texgs.report import published
 from texgs.report.metrics_files import Record, of
 from texgs.report.published import DATA, LABEL, PAPER_LABEL, cells, in_order, mean_rows, paper, paper_file
 from texgs.report.results import EditMeasures, EditResult
@@ -23,12 +24,8 @@ CONSISTENCY = (
     "as fitted."
 )
 CAPTION = (
-    "Sizes are those of the paper's tables of edits, with 100 bytes for each surfel beside its texels. "
+    "Sizes count 100 bytes for each surfel beside its texels, as the paper's tables do. "
     f"{CONSISTENCY} Mean rows count no stand-ins. Edits of no comparison are in the table of all edits."
-)
-UNLIKE_NOTE = (
-    "The paper's rows are means over four data sets on an RTX 4090. It publishes neither its pictures nor "
-    "its instructions nor its transfer functions, so they stand by themselves."
 )
 ADAPTS = "adapts"  # method in mean rows over data sets with different methods
 FOLLOW_ORDER = ("style", "instruction", "")  # what edits follow, in the order of the table of all edits
@@ -52,14 +49,17 @@ def paper_measures(follows: str) -> list[Measure]:
 
 def image_driven(records: Iterable[Record[Any]]) -> Table:
     """Return the comparison of edits by pictures, for which the paper has no CLIP scores."""
-    return comparison("style", compared_rows(records, "style"), paper_measures("style"))
+    rows = compared_rows(records, "style")
+    return comparison("style" if published.are_of_paper(records) else "", rows, paper_measures("style"))
 
 
 def text_driven(records: Iterable[Record[Any]]) -> Table:
     """Return the comparison of edits by instructions, without other methods with frozen geometry."""
     rows = compared_rows(records, "instruction")
     free = [row for row in rows if row["has_texture"] or not row["is_kept"]]
-    return comparison("instruction", free, paper_measures("instruction"))
+    return comparison(
+        "instruction" if published.are_of_paper(records) else "", free, paper_measures("instruction")
+    )
 
 
 def text_driven_frozen(records: Iterable[Record[Any]]) -> Table:
@@ -98,8 +98,7 @@ def comparison(follows: str, rows: Rows, listed: Sequence[Measure]) -> Table:
     means = mean_rows(rows, (LABEL, "edit", "pixels", "device"), ["method", *titles])
     means = [{**row, "method": row["method"] or ADAPTS} for row in means]
     theirs = paper_rows(follows, listed) if rows and follows else []
-    sentences = [CAPTION, UNLIKE_NOTE, *notes(rows, titles)] if theirs else [CAPTION, *notes(rows, titles)]
-    return Table(" ".join(sentences), [*LABELS, *columns], [*rows, *means, *theirs])
+    return Table(" ".join([CAPTION, *notes(rows, titles)]), [*LABELS, *columns], [*rows, *means, *theirs])
 
 
 def rows_of(records: Iterable[Record[Any]]) -> Rows:

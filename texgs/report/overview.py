@@ -50,6 +50,7 @@ def what(records: Sequence[Record[Any]], scene: Record[SceneResult] | None) -> s
     words += f", shown by {functions}" if functions else ""
     if scene is not None:
         words += f", as a scene of {scene.result.primitives:,} {scene.field}"
+        words += f" by {scene.label}" if len({each.label for each in of(SceneResult, records)}) > 1 else ""
     edits = ", ".join(sorted({record.result.edit for record in of(EditResult, records)}))
     return f"{words}{f', with the edits {edits}' if edits else ''}."
 

@@ -20,7 +20,7 @@ from texgs.report.results import SECTIONS, EditResult, GalleryResult, PageResult
 SECTIONS_OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what they follow
 NARROW_WIDTH = 1000  # pixels; narrower pictures stand side by side
 AS_FITTED = "as fitted"  # label of a scene without an edit
-MAILED = 18 * 10**6  # bytes of a report that holds pages: as an attachment they are the 25 MB of a mail
+MAILED = 17 * 10**6  # bytes of pages in a report, which with tables is then 25 MB as an attachment
 WEBP_QUALITY, WEBP_EFFORT = 85, 2  # full quality is in the folders of jobs
 
 

@@ -37,7 +37,7 @@ PLANE = (
 DIRECTIONS = "RASLPIXYZ"  # axes of the space of a volume's file
 BOX = "X0,Y0,Z0,X1,Y1,Z1, in world units"
 PLACES = {"marker": "TEXT@X,Y,Z", "distance": "X,Y,Z:X,Y,Z or TEXT@X,Y,Z:X,Y,Z"}  # words of new markers
-TABLES = ("cuts", "functions", "markers")  # whole, as scene files have them
+TABLES = ("cuts", "markers")  # whole, as scene files have them; words have others
 VOXEL_SUFFIX = "v"  # after a position in samples, counted from 0
 
 

@@ -51,7 +51,7 @@ class Film(Shot):
             from texgs.scene.keyframes import read_keys
 
             object.__setattr__(self, "keys", read_keys(self.keys, self, self.fps))
-            if self.what != "view":
+            if self.what not in ("view", "orbit"):  # defaults here and in Python
                 raise ArgumentError(f"film: expected keys or a path, got keys and {self.what}; leave one out")
         if sum(each is not None for each in (self.frames, self.seconds, self.keys)) > 1:
             raise ArgumentError("frames: expected a number of frames or of seconds, or keys, got several")

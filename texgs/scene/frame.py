@@ -1,5 +1,6 @@
 """Frames of a scene for display: colours, normals, depth, material; and the point at a pixel."""
 
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
@@ -9,6 +10,7 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.image import to_pillow
+from texgs.core.light import HEADLIGHT
 from texgs.core.memory import require_memory
 from texgs.fields.field import Composed, Look
 from texgs.raster import Render
@@ -16,7 +18,7 @@ from texgs.raster.shading import MATERIAL
 from texgs.scene.cut_view import cut_view
 from texgs.scene.scene import Scene
 from texgs.scene.shot import Mode
-from texgs.scene.twin import Twin
+from texgs.scene.twin import LIT, Twin
 
 BLACK_MODES = ("alpha", *MATERIAL)
 SHININESS = 100.0  # displayed as white
@@ -68,7 +70,8 @@ def frame(
         look: Look = mode if mode in get_args(Look) else "shaded"  # type: ignore[assignment]
         outputs = {"normal": ("normal",), "depth": ("depth",)}.get(mode, ())
         background = None if mode in MATERIAL else torch.tensor(scene.background, device=composed.device)
-        render = cut_view(composed, camera, scene, twin, look=look, background=background, outputs=outputs)
+        shown = scene if mode in LIT else replace(scene, light=HEADLIGHT)  # shadows would need the volume
+        render = cut_view(composed, camera, shown, twin, look=look, background=background, outputs=outputs)
     behind = render.color.new_tensor((0.0,) * 3 if mode in BLACK_MODES else scene.background)
     colors = pixels(render, mode, behind)
     if not transparent:

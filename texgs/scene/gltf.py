@@ -30,21 +30,21 @@ class Glb:
 
     def add(self, packed: bytes, **about: int) -> int:
         """Add data, and return the number of their view."""
-        start, gap = len(self.data), -len(packed) % 4
-        self.out["bufferViews"].append({"buffer": 0, "byteOffset": start, "byteLength": len(packed), **about})
-        self.data += packed + bytes(gap)
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(packed), **about}
+        self.out["bufferViews"].append(view)
+        self.data += packed + bytes(-len(packed) % 4)
         return len(self.out["bufferViews"]) - 1
 
     def attributes(self, values: Mapping[str, np.ndarray]) -> dict[str, int]:
         """Add attributes of vertices [N] or [N, C] by name, and return the numbers of their accessors."""
         places = {}
         for name, rows in values.items():
-            view = self.add(rows.astype("<f4").tobytes(), target=VERTICES)
             kind = {"componentType": FLOAT, "type": TYPES[rows.shape[1:]], "count": len(rows)}
-            ends = {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+            if name == "POSITION":
+                kind |= {"min": rows.min(axis=0).tolist(), "max": rows.max(axis=0).tolist()}
+            view = self.add(rows.astype("<f4").tobytes(), target=VERTICES)
             places[name] = len(self.out["accessors"])
-            bounds = ends if name == "POSITION" else {}
-            self.out["accessors"].append({"bufferView": view, **kind, **bounds})
+            self.out["accessors"].append({"bufferView": view, **kind})
         return places
 
     def write(self, path: str | Path, told: Told, description: Mapping[str, Any]) -> Path:

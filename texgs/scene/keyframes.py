@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,7 @@ from texgs.scene.shot import Shot
 
 KEPT = ("azimuth", "polar", "radius", "fov_y", "target", "seconds")  # by keys that do not name them
 COLORS = ("palette", "tint", "background")  # they move in OKLab
+as_json = partial(json.dumps, default=str, ensure_ascii=False)
 Stop = tuple[Any, Scene]  # a shot, and what it shows
 
 
@@ -54,10 +56,7 @@ def read_keys(keys: Any, start: Shot, fps: float) -> list[Key]:
             of_parts = (str(name) for name in row if {*"./"} & {*str(name)})
             require_keys(row, (*KEPT, "cut", *PLACES, *SCENE_KEYS, *of_parts), "a key")
             values |= {name: row[name] for name in KEPT if name in row} | {"where": where}
-            texts = {
-                name: x if isinstance(x, str) else json.dumps(x, default=str, ensure_ascii=False)
-                for name, x in row.items()
-            }
+            texts = {name: x if isinstance(x, str) else as_json(x) for name, x in row.items()}
             values["words"] = [f"{n}={'' if x == 'null' else x}" for n, x in texts.items() if n not in KEPT]
             values["at"] = made[-1].at + max(1, round(made[-1].seconds * fps)) if made else 0
             made.append(typed_argument(Key, values))
@@ -82,12 +81,9 @@ def keyed_shots(keys: Sequence[Key], scene: Scene, composed: Composed) -> Iterat
             framed = session.scene.frame or session.scene.framed(session.composition)
             each.camera(framed)
         lens: Any = each.lens(framed)
-        seen = {
-            "azimuth": framed.azimuth if each.azimuth is None else each.azimuth,
-            "radius": lens.radius,
-            "target": tuple(lens.target),
-        }
-        stops[each.at] = replace(each, **seen, words=()), session.scene
+        azimuth = framed.azimuth if each.azimuth is None else each.azimuth
+        seen = replace(each, azimuth=azimuth, radius=lens.radius, target=tuple(lens.target), words=())
+        stops[each.at] = seen, session.scene
     return between(stops)
 
 

@@ -85,8 +85,8 @@ def textured(mesh: Mesh, views: Sequence[DepthView], tolerance: float, faces: in
         inside = ((middle - uv[own, 0]) / legs).clip(0)  # padding has what is nearest in the triangle
         inside /= inside.sum(axis=1, keepdims=True).clip(1)
         weights = np.column_stack([1 - inside.sum(axis=1), inside]).astype(np.float32)
-        at, ahead, own_colors = (torch.from_numpy(np.einsum("tk,tkc->tc", weights, x[own])) for x in corners)
-        shown = seen_colors(at, ahead, own_colors, views, tolerance)
+        at = [torch.from_numpy(np.einsum("tk,tkc->tc", weights, x[own])) for x in corners]
+        shown = seen_colors(at[0], at[1], at[2], views, tolerance)
         picture.reshape(-1, 3)[texels] = shown.numpy()
     return Textured(vertices, normals, triangles, uv / side, picture, surface.n_open_edges)
 
@@ -157,14 +157,14 @@ def seen_colors(
 
 def notes_on(model: Textured, render: Callable[[Camera], Render], cameras: Sequence[Camera]) -> list[str]:
     """Say in sentences whether a textured mesh is closed, and how far it is from its scene."""
-    count = f"{len(model.triangles):,} triangles"
     closed = f"not closed: {model.open_edges:,} edges are open" if model.open_edges else "closed"
+    what = f"{len(model.triangles):,} triangles, {closed}"
     try:
         level, lost = deviation(model, render, cameras)
     except DeviceError as error:
-        return [f"{count}, {closed}; how far it is from the scene is not known: {error}"]
+        return [f"{what}; how far it is from the scene is not known: {error}"]
     lacks = f"{100 * lost:.1f} % of the opacity is where it has no surface"
-    return [f"{count}, {closed}; {level:.1f} dB from the scene in {len(cameras)} views, and {lacks}"]
+    return [f"{what}; {level:.1f} dB from the scene in {len(cameras)} views, and {lacks}"]
 
 
 def deviation(

@@ -20,22 +20,18 @@ def write_glb(path: Path, model: Textured, *, has_light: bool, told: Told = None
     corners = {"POSITION": model.vertices[model.triangles], "NORMAL": model.normals[model.triangles]}
     places = glb.attributes({name: x.reshape(-1, 3) for name, x in corners.items()})
     places |= glb.attributes({"TEXCOORD_0": model.uv.reshape(-1, 2)})
-    image = {"bufferView": glb.add(model.png()), "mimeType": "image/png"}
     matte = {"baseColorTexture": {"index": 0}, "metallicFactor": 0.0, "roughnessFactor": 1.0}
     unlit: dict[str, Any] = {"extensions": {UNLIT: {}}} if has_light else {}
-    return glb.write(
-        path,
-        told,
-        {
-            "nodes": [{"name": path.stem, "mesh": 0}],
-            "meshes": [{"name": path.stem, "primitives": [{"attributes": places, "material": 0}]}],
-            "materials": [{"pbrMetallicRoughness": matte, "doubleSided": True, **unlit}],
-            "textures": [{"source": 0, "sampler": 0}],
-            "samplers": [{"magFilter": LINEAR, "minFilter": LINEAR, "wrapS": CLAMPED, "wrapT": CLAMPED}],
-            "images": [image],
-            **({"extensionsUsed": [UNLIT]} if has_light else {}),
-        },
-    )
+    description = {
+        "nodes": [{"name": path.stem, "mesh": 0}],
+        "meshes": [{"name": path.stem, "primitives": [{"attributes": places, "material": 0}]}],
+        "materials": [{"pbrMetallicRoughness": matte, "doubleSided": True, **unlit}],
+        "textures": [{"source": 0, "sampler": 0}],
+        "samplers": [{"magFilter": LINEAR, "minFilter": LINEAR, "wrapS": CLAMPED, "wrapT": CLAMPED}],
+        "images": [{"bufferView": glb.add(model.png()), "mimeType": "image/png"}],
+        **({"extensionsUsed": [UNLIT]} if has_light else {}),
+    }
+    return glb.write(path, told, description)
 
 
 def write_obj(path: Path, model: Textured, told: Told = None) -> Path:

@@ -14,7 +14,6 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import HIDING
 from texgs.models.instruction import WORDS
 from texgs.scene.scene import Scene
-from texgs.scene.scene_file import title_of
 from texgs.scene.session import Session
 from texgs.viewer.description import bounds, describe, presets
 from texgs.viewer.downloads import exports_of
@@ -52,7 +51,8 @@ class Server:
         session: Session | None = None,
     ) -> None:
         session = session or Session(opened.scene, device)  # shared with whoever edits the scene, too
-        self._title, composed = title_of(opened.source), session.composition
+        composed = session.composition
+        self._name = "/".join(opened.source.resolve().parts[-4:])  # of links: scenes may share a title
         self._bounds, self._device = bounds(opened.scene, composed), device
         self._opened = self._latest = (files_of_models(opened.scene), composed)  # models as they were fitted
         self.edits = SharedEdits(session, opened)
@@ -236,7 +236,7 @@ class Server:
         if files not in (self._opened[0], self._latest[0]):
             self._latest = (files, scene.as_fitted.open(self._device))
         composed = self._opened[1] if files == self._opened[0] else self._latest[1]
-        return describe(self._title, scene, composed, self._bounds)
+        return describe(self._name, scene, composed, self._bounds)
 
     async def _say_goodbye(self, app: web.Application) -> None:
         """Close all connections."""

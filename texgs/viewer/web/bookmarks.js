@@ -36,8 +36,10 @@ export class Bookmarks {
     const { original, scene } = this.#page.state, poses = words.get("bookmarks").split(";").map(unpacked);
     const isOfAnother = (words.get("scene") ?? scene.name) !== scene.name;
     const own = isOfAnother ? [] : words.getAll("kept");
-    const editsAt = (i) => own[i] ? editsOf(own[i], original, wrong) : edits;
-    const kept = poses.map((pose, i) => pose && { pose, scene: editsAt(i).reduce(edited, original) });
+    const reset = difference(original, scene, true).map((edit) => ({ ...edit, value: null })).reduce(edited, scene);
+    const unedited = difference(reset, original).reduce(edited, reset); // with all parts of now, segments too
+    const editsAt = (i) => own[i] ? editsOf(own[i], unedited, wrong) : edits;
+    const kept = poses.map((pose, i) => pose && { pose, scene: editsAt(i).reduce(edited, unedited) });
     if (poses.includes(undefined) || poses.length > MOST) wrong.push("bookmarks");
     this.#set(kept.filter(Boolean).slice(0, MOST));
   }
@@ -46,8 +48,8 @@ export class Bookmarks {
   get words() {
     const { original, scene: now } = this.#page.state, words = [["bookmarks", this.kept.map(packed).join(";")]];
     const isEdited = this.kept.some(({ scene }) => difference(now, scene).length);
-    const edits = isEdited ? this.kept.map(({ scene }) => ["kept", JSON.stringify(difference(original, scene))]) : [];
-    return this.kept.length ? [...words, ...edits] : [];
+    const edits = this.kept.map(({ scene }) => ["kept", JSON.stringify(difference(original, scene, true))]);
+    return this.kept.length ? [...words, ...(isEdited ? edits : [])] : [];
   }
 
   #set(kept) {
@@ -71,10 +73,10 @@ export class Bookmarks {
 
   /** Make the edits of a bookmark, and take others back. */
   #restore({ pose, scene }) {
+    if (!this.#page.place(pose)) return;
     for (const { part, key, value } of difference(this.#page.state.scene, scene)) {
       this.#page.state.edit(part, key, value);
     }
-    this.#page.place(pose);
   }
 
   #button(title, properties, text) {

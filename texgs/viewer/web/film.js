@@ -2,7 +2,7 @@
 
 import { download, element } from "./inputs.js";
 import { numberInput, sizeInputs } from "./size_inputs.js";
-import { difference } from "./state.js";
+import { difference, partsOf } from "./state.js";
 
 const KINDS = ["mp4", "gif", "keys"];
 const TURN = 4; // keys of a turn: more than half of one between two would be the long way
@@ -36,31 +36,34 @@ export class FilmInputs {
 
   get values() {
     if (get("film").disabled) return {};
-    return { size: this.#size.value, keys: this.#keys, fps: this.#fps.input.valueAsNumber };
+    const { shown, state } = this.#page, keys = this.#keys(shown.before ? state.original : state.scene);
+    return { size: this.#size.value, keys, fps: this.#fps.input.valueAsNumber };
   }
 
   /** Save the keys as a file, and say how the command line makes the film of them. */
   save() {
-    const { keys, fps, size: [width, height] } = this.values, { file, past, saved } = this.#page.state;
-    const name = file.replace(/(\.ya?ml)?$/, "-keys.yaml"), { mode } = this.#page.shown;
-    download(new Blob(keys.map((key) => `- ${JSON.stringify(key)}\n`)), name);
-    const options = `--width ${width} --height ${height} --fps ${fps}${mode === "shaded" ? "" : ` --mode ${mode}`}`;
+    const { fps, size: [width, height] } = this.values, { file, past, saved, scene: now } = this.#page.state;
+    const name = file.replace(/(\.ya?ml)?$/, "-keys.yaml");
+    download(new Blob(this.#keys(now).map((key) => `- ${JSON.stringify(key)}\n`)), name);
+    const options = `--width ${width} --height ${height} --fps ${fps}${this.#page.options}`;
     const first = saved ? "" : " Save the scene first.";
     const scene = past.length ? file : "SCENE"; // as it was opened, wherever that is
     this.#page.notices.tell(`This film again: texgs render ${scene} --film ${name} ${options}.${first}`, "info");
   }
 
-  /** Keys as `texgs render --film` has them, evenly over all frames; edits are those since the key before. */
-  get #keys() {
-    const { camera, shown, state, bookmarks } = this.#page, fps = this.#fps.input.valueAsNumber;
+  /** Keys as `texgs render --film` has them, evenly over all frames; edits are those since a scene or the key before. */
+  #keys(start) {
+    const { camera, state, bookmarks } = this.#page, parts = partsOf(state.scene), fps = this.#fps.input.valueAsNumber;
     const way = this.#way.value, stops = way === "turn" ? Array(TURN).fill({ pose: camera.pose }) : bookmarks.kept;
     const count = Math.max(stops.length, Math.round(this.#seconds.input.valueAsNumber * fps)); // one a key at least
     const at = stops.map((_, i) => Math.round(i * (count - 1) / (stops.length - 1)));
-    let before = shown.before ? state.original : state.scene;
+    const isThere = ({ part }) => part === "" || parts.has(part); // a segment may be gone again
+    let before = start;
     return stops.map(({ pose: { azimuth, polar, distance: radius, fov_y, target }, scene }, i) => {
       const turned = way === "turn" ? azimuth + 360 * at[i] / count : azimuth, edits = [];
       if (way === "edits") {
-        edits.push(...difference(before, scene).map(({ part, key, value }) => [part ? `${part}.${key}` : key, value]));
+        const changed = difference(before, scene).filter(isThere);
+        edits.push(...changed.map(({ part, key, value }) => [part ? `${part}.${key}` : key, value]));
         before = scene;
       }
       const seconds = i < at.length - 1 ? { seconds: (at[i + 1] - at[i]) / fps } : {};

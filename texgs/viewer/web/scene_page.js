@@ -159,11 +159,12 @@ export class ScenePage {
     this.draw(true);
   }
 
-  /** Put the camera somewhere; what is not named stays. */
+  /** Put the camera somewhere, and return whether it may move; what is not named stays. */
   place(pose) {
-    if (this.#isLocked()) return;
+    if (this.#isLocked()) return false;
     this.camera.place(pose);
     this.moved();
+    return true;
   }
 
   /** Go to a named view: "home", an axis, or one of the scene's. */
@@ -221,6 +222,12 @@ export class ScenePage {
     return [this.camera.toFragment(), words.toString()].filter(Boolean).join("&");
   }
 
+  /** The options of `texgs render` for the mode and the legend, which is not beside --compare. */
+  get options() {
+    const { mode, legend } = this.#shown;
+    return `${OPTIONS[mode] ?? ` --mode ${mode}`}${legend && !OPTIONS[mode] ? " --legend" : ""}`;
+  }
+
   /** The name of a mode, and what its colours mean. */
   words(mode) {
     return this.state.scene.volume && OF_VOLUME[mode] || MODES[mode];
@@ -229,9 +236,7 @@ export class ScenePage {
   #rest() {
     this.#resting = 0;
     if (this.#moving) this.renderer.draw(this.camera, this.state.scene, { moving: false, ...this.#shown });
-    const { mode, legend } = this.#shown, marked = legend && !OPTIONS[mode] ? " --legend" : ""; // not beside --compare
-    const asked = `${OPTIONS[mode] ?? ` --mode ${mode}`}${marked}`;
-    get("options").textContent = `texgs render ${this.camera.options(...this.renderer.size())}${asked}`;
+    get("options").textContent = `texgs render ${this.camera.options(...this.renderer.size())}${this.options}`;
     try {
       history.replaceState(null, "", `#${this.#fragment}`);
     } catch {

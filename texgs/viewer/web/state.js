@@ -46,7 +46,7 @@ export function difference(from, to, others = false) {
 }
 
 /** Edits by the names of parts. */
-function partsOf(scene) {
+export function partsOf(scene) {
   return new Map(scene.models.flatMap((model) => [
     [model.name, model.edit],
     ...model.segments.map((each) => [`${model.name}/${each.name}`, each.edit]),
