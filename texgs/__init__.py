@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from texgs.api.volume import Volume
     from texgs.volume.transfer import TransferFunction
 
-__version__ = "1.0.0"
+__version__ = "1.1.0"
 __all__ = ["Functions", "Scene", "TransferFunction", "Volume", "fit", "open", "results"]
 
 HOMES = {
