@@ -42,16 +42,16 @@ from tools import workflow_picture
 DOCS, RUNS = ROOT / "docs", ROOT / "build" / "pictures"
 PROGRAM = Path(sys.executable).with_name("texgs")
 STYLES = ("strokes", "glass", "marble", "weave", "dots", "waves")
-METHODS = (  # of the paper's tables, by their authors' iterations: hours
-    "galleries dataset=vortex fit.reduce=2 fits=[default,gaussians,plenoxels_quick]"
-    " edit.looks=true edit.image.lambda_s=1 edit.text.guidance=filters edit.in2n.guidance=filters"
-    " edit.igs2gs.guidance=filters"
+METHODS = (  # of the paper's tables, by short recipes
+    "galleries dataset=vortex fit.reduce=2 fits=[quick,gaussians_quick,plenoxels_quick]"
+    " edit.looks=true edit.image.lambda_s=1"
 )
 RUN = {  # words of `texgs run`, by the folder of its results
     "demo": "experiment=demo",
     "fields": "experiment=fields tf=TF04_400 dataset.image=400 fit.reduce=1 comparisons",
-    "image": f"{METHODS} edits=[style,style_untextured,stylesplat,arf] gallery.section=image",
-    "text": f"{METHODS} edits=[text,text_untextured,in2n,igs2gs,igs2gs_frozen] gallery.section=text",
+    "image": f"{METHODS} edits=[style,style_untextured,stylesplat_quick,arf_quick] gallery.section=image",
+    "text": f"{METHODS} edits=[text_quick,text_untextured_quick,in2n_quick,igs2gs_quick,dge_quick]"
+    " gallery.section=text",
     "styles": "datasets=[vortex,engine] dataset.vortex.fit.reduce=2 dataset.engine.views.width=400"
     f" dataset.engine.views.height=400 fit=quick edit=style edit.image.style={','.join(STYLES)}"
     " edit.image.recipe=preview,default",
@@ -226,7 +226,7 @@ PICTURES = {
         copy(GALLERY, smaller=2), "image", f"{FIT} gaussians voxels image stylesplat arf gallery"
     ),
     "text_methods": Picture(
-        copy(GALLERY, smaller=2), "text", f"{FIT} gaussians voxels text in2n igs2gs gallery"
+        copy(GALLERY, smaller=2), "text", f"{FIT} gaussians voxels text in2n igs2gs dge gallery"
     ),
     "styles": Picture(styles, "styles", f"{FIT} image"),
     "hues": Picture(copy("orbital/gallery/hue/hue.png", smaller=2), "hue", f"{FIT} image gallery"),
